@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <new>
+#include <span>
+#include <type_traits>
+
+#include "pipeline/core/image_view.hpp"
+
+namespace stereotrack {
+
+/// All memory of the stages, taken at start and given back together at the end.
+/// Set-up only, one thread. After seal() nothing more is handed out: a stage that asks in the frame
+/// loop gets nothing and failed() becomes true, which tests look at.
+class Arena {
+ public:
+  static constexpr std::size_t kAlignment = 64;  ///< a cache line, and the widest vector register
+
+  Arena() noexcept = default;
+  Arena(const Arena&) = delete;
+  Arena& operator=(const Arena&) = delete;
+  ~Arena() {
+    while (blocks_ != nullptr) {
+      Block* next = blocks_->next;
+      ::operator delete (blocks_, std::align_val_t{kAlignment});
+      blocks_ = next;
+    }
+  }
+
+  /// `count` zeroed elements, aligned to kAlignment; empty, and failed() from then on, if there is
+  /// no memory or the arena is sealed.
+  template <class T>
+  [[nodiscard]] std::span<T> array(std::size_t count) noexcept {
+    static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+    void* memory = take(count * sizeof(T));
+    if (memory == nullptr) return {};
+    std::memset(memory, 0, count * sizeof(T));
+    return {static_cast<T*>(memory), count};
+  }
+
+  /// A zeroed picture whose rows start on kAlignment and are followed by at least one vector of padding.
+  template <class T>
+  [[nodiscard]] ImageView<T> image(int width, int height) noexcept {
+    constexpr std::size_t kPerLine = kAlignment / sizeof(T) > 0 ? kAlignment / sizeof(T) : 1;
+    const std::size_t stride = ((static_cast<std::size_t>(width) + kPerLine - 1) / kPerLine + 1) * kPerLine;
+    std::span<T> pixels = array<T>(stride * static_cast<std::size_t>(height));
+    if (pixels.empty()) return {};
+    return {pixels.data(), width, height, static_cast<std::ptrdiff_t>(stride)};
+  }
+
+  void seal() noexcept { sealed_ = true; }
+  [[nodiscard]] bool failed() const noexcept { return failed_; }
+  [[nodiscard]] std::size_t bytes_used() const noexcept { return used_; }
+
+ private:
+  struct Block {
+    Block* next;
+  };
+
+  void* take(std::size_t bytes) noexcept {
+    if (sealed_) {
+      failed_ = true;
+      return nullptr;
+    }
+    void* memory = ::operator new (bytes + kAlignment, std::align_val_t{kAlignment}, std::nothrow);
+    if (memory == nullptr) {
+      failed_ = true;
+      return nullptr;
+    }
+    blocks_ = new (memory) Block{blocks_};
+    used_ += bytes;
+    return static_cast<char*>(memory) + kAlignment;
+  }
+
+  Block* blocks_ = nullptr;
+  std::size_t used_ = 0;
+  bool sealed_ = false;
+  bool failed_ = false;
+};
+
+}  // namespace stereotrack
