@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <cstring>
+#include <memory>
 #include <new>
 #include <span>
 #include <type_traits>
@@ -28,15 +28,16 @@ class Arena {
     }
   }
 
-  /// `count` zeroed elements, aligned to kAlignment; empty, and failed() from then on, if there is
+  /// `count` value-initialised (zeroed) elements, aligned to kAlignment; empty, and failed() from then on, if there is
   /// no memory or the arena is sealed.
   template <class T>
   [[nodiscard]] std::span<T> array(std::size_t count) noexcept {
-    static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+    static_assert(std::is_default_constructible_v<T> && std::is_trivially_destructible_v<T>);
     void* memory = take(count * sizeof(T));
     if (memory == nullptr) return {};
-    std::memset(memory, 0, count * sizeof(T));
-    return {static_cast<T*>(memory), count};
+    T* first = static_cast<T*>(memory);
+    std::uninitialized_value_construct_n(first, count);
+    return {first, count};
   }
 
   /// A zeroed picture whose rows start on kAlignment and are followed by at least one vector of padding.

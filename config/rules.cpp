@@ -1,0 +1,85 @@
+#include "config/rules.hpp"
+
+#include <algorithm>
+
+#include "config/schema.hpp"
+
+namespace stereotrack::config {
+namespace {
+
+std::string destinations_differ(const Configuration& c) {
+  std::vector<std::string> sorted = c.telemetry.destinations;
+  std::sort(sorted.begin(), sorted.end());
+  const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
+  if (twice == sorted.end()) return {};
+  return quoted(*twice) +
+         " stands there twice, its receiver would take every second datagram for a replay: name it once";
+}
+
+std::string seeds_over_candidates(const Configuration& c) {
+  if (c.pipeline.foreground.high_sd >= c.pipeline.foreground.low_sd) return {};
+  return "low_sd is above high_sd, a seed must also be a candidate: give low_sd <= high_sd";
+}
+
+std::string level_set_has_iterations(const Configuration& c) {
+  if (!c.pipeline.shape.level_set || c.pipeline.shape.level_set_config.max_iterations > 0) return {};
+  return "the level set is on and may not iterate: give at least 1, or level_set.on = false";
+}
+
+std::string split_stays_split(const Configuration& c) {
+  if (c.pipeline.objects.merge_depth <= c.pipeline.objects.split_depth) return {};
+  return "merge_depth is above split_depth, what is split would be merged again: give merge_depth <= split_depth";
+}
+
+/// Set by the user, not by a preset or a default.
+bool said_by_user(const Loaded& loaded, std::string_view key) {
+  const auto origin = loaded.origins.find(key);
+  return origin != loaded.origins.end() && !origin->second.starts_with("config/presets/");
+}
+
+}  // namespace
+
+std::span<const Rule> rules() {
+  static const std::vector<Rule> all = {
+      {"telemetry_destinations_differ", {"telemetry.destinations"}, destinations_differ},
+      {"seeds_over_candidates", {"foreground.low_sd", "foreground.high_sd"}, seeds_over_candidates},
+      {"level_set_has_iterations", {"level_set.iterations", "level_set.on"}, level_set_has_iterations},
+      {"split_stays_split", {"objects.merge_depth", "objects.split_depth"}, split_stays_split},
+  };
+  return all;
+}
+
+void check_rules(const Loaded& loaded) {
+  for (const Rule& rule : rules()) {
+    std::string what = rule.broken(loaded.configuration);
+    if (what.empty()) continue;
+    const auto said = std::find_if(rule.keys.begin(), rule.keys.end(),
+                                   [&](std::string_view key) { return said_by_user(loaded, key); });
+    const std::string_view blamed = said == rule.keys.end() ? rule.keys.front() : *said;
+    for (const std::string_view key : rule.keys) {
+      if (key == blamed) continue;
+      const auto origin = loaded.origins.find(key);
+      what +=
+          "; " + std::string(key) + " is from " + (origin == loaded.origins.end() ? "the defaults" : origin->second);
+    }
+    throw error_at(loaded.origins, blamed, what);
+  }
+}
+
+void check_metres(const Loaded& loaded, double unit_m) {
+  Configuration copy = loaded.configuration;
+  check_metres(keys_of(copy), loaded.origins, unit_m);
+}
+
+void check_metres(std::span<const Key> keys, const Origins& origins, double unit_m) {
+  if (unit_m > 0) return;
+  for (const Key& key : keys) {
+    const bool metres = key.unit == "m" || key.unit.starts_with("m/");
+    if (!metres || std::get<double>(key.get()) == 0) continue;
+    throw error_at(origins, key.name,
+                   "it is in metres, and the calibration's unit is not known: set calibration.unit_m to the metres in "
+                   "one unit of T");
+  }
+}
+
+}  // namespace stereotrack::config

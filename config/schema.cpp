@@ -1,0 +1,240 @@
+#include "config/schema.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include "config/presets.hpp"
+
+namespace stereotrack::config {
+namespace {
+
+/// ADDR:PORT, NAME:PORT or [ADDR6]:PORT.
+std::string check_destination(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  const std::string_view host = text.substr(0, colon == std::string_view::npos ? 0 : colon);
+  const std::string_view port = colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
+  const bool bracketed = host.size() > 2 && host.front() == '[' && host.back() == ']';
+  const bool host_good = !host.empty() && host.find_first_of(" \t/") == std::string_view::npos &&
+                         (bracketed || host.find_first_of("[]:") == std::string_view::npos);
+  const bool digits =
+      !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string_view::npos;
+  const int number = digits ? std::stoi(std::string(port)) : 0;
+  if (host_good && number >= 1 && number <= 65535) return {};
+  return quoted(text) + " is not ADDR:PORT: write it like \"192.168.1.10:9000\" or \"[fe80::1]:9000\"";
+}
+
+}  // namespace
+
+std::vector<Key> keys_of(Configuration& c) {
+  PipelineConfig& p = c.pipeline;
+  return {
+      key("preset", c.preset, preset_names(), "Which preset gives the values that are not given here."),
+
+      key("source.fps", c.source.fps, 0.1, 1000, "1/s",
+          "Pairs per second, used only where the source itself has no times: every speed follows from it."),
+      key("source.flip", c.source.flip, "Turns both views top to bottom, for cameras that hang upside down."),
+      key("source.swap", c.source.swap,
+          "Exchanges the left and the right view, for recordings that name them the other way round."),
+      key("source.shift_rows", c.source.shift_rows, -100, 100, "px",
+          "Rows that the right picture is moved down (negative: up), for video files whose views were cut at different "
+          "heights."),
+
+      key("synthetic.seed", c.synthetic.seed, 0, 4294967295.0, "",
+          "Which drawing of the scene synthetic:NAME shows; no other source looks at this section."),
+      key("synthetic.frames", c.synthetic.frames, 1, 100000, "frames", "How many pairs synthetic:NAME gives."),
+      key("synthetic.width", c.synthetic.width, 64, 4096, "px", "Width of its pictures."),
+      key("synthetic.height", c.synthetic.height, 48, 3072, "px", "Height of its pictures."),
+
+      key("latency.output_ms", c.latency.output_ms, 1, 10000, "ms",
+          "Time from the middle of the exposure to the moment its result is sent: longer misses fewer deadlines, "
+          "shorter predicts less."),
+
+      key("calibration.unit_m", c.calibration.unit_m, 0, 1000, "m per unit of T",
+          "Metres in one length unit of the calibration file; 0: as the file's format says (Kalibr, ROS, EuRoC, KITTI: "
+          "1), else unknown, and then no rule may be stated in metres."),
+
+      key("telemetry.destinations", c.telemetry.destinations, check_destination,
+          "Where the datagrams go over UDP, ADDR:PORT each; empty: nothing is sent."),
+      key("telemetry.rig_id", c.telemetry.rig_id, 0, 4294967295.0, "",
+          "Number of this rig in every datagram, so that a receiver can tell rigs apart."),
+
+      key("equalise.mode", p.equalise,
+          {{"off", EqualiseMode::kOff}, {"frame", EqualiseMode::kFrame}, {"frozen", EqualiseMode::kFrozen}},
+          "Histogram equalisation (3.2-3.5): frame by frame makes the background flicker, frozen keeps the first table."),
+
+      key("background.method", p.background.method,
+          {{"adaptive", ForegroundMethod::kAdaptive}, {"edges", ForegroundMethod::kEdges}},
+          "How foreground is found: by an adaptive background, or by the document's mean, difference and edges."),
+      key("background.frames", p.background.frames, 1, 10000, "frames",
+          "Frames whose mean is the background (3.7); until then the mean of those seen, flagged as learning."),
+      key("background.window", p.background.adaptive.window, 2, 1024, "frames",
+          "Memory of the adaptive background: longer is steadier, shorter follows the light faster."),
+      key("background.absorb_frames", p.background.adaptive.absorb_frames, 2, 60000, "frames",
+          "What stands still for so long becomes background."),
+      key("background.noise_floor", p.background.adaptive.noise_floor, 1, 4096, "1/256 grey level",
+          "Added to each pixel's measured noise: higher finds less in the dark and in clean pictures."),
+      key("background.edge_percent", p.background.adaptive.edge_percent, 0, 200, "%",
+          "Motion of background edges that is tolerated, in percent of a pixel: higher calms shaking masts."),
+      key("background.relearn_percent", p.background.adaptive.relearn_percent, 1, 100, "%",
+          "When more of the picture changes at once, it is light, not motion: the background starts anew, flagged."),
+
+      key("foreground.low_sd", p.foreground.low_sd, 0.5, 30, "sd",
+          "Distance from the background from which a pixel may belong to an object."),
+      key("foreground.high_sd", p.foreground.high_sd, 0.5, 31, "sd",
+          "Distance that some pixels of an object must reach."),
+      key("foreground.halo_percent", p.foreground.halo_percent, 0, 90, "%",
+          "Pixels weaker than this part of a strong neighbour are its blur, not object: higher gives tighter boxes."),
+      key("foreground.min_seeds", p.foreground.min_seeds, 1, 10000, "px",
+          "Pixels over high_sd that an object needs."),
+
+      key("shape.edge_threshold", p.shape.edge_threshold, 1, 255, "grey levels",
+          "Edge strength from which a pixel is an edge (3.12); only with background.method = edges."),
+      key("shape.opening", p.shape.opening, 0, 10, "passes", "3x3 openings (3.13): more removes larger specks."),
+      key("shape.closing", p.shape.closing, 0, 10, "passes", "3x3 closings: more bridges wider gaps in an object."),
+      key("shape.hole_px", p.shape.hole_px, 0, 1000000, "px", "Holes up to this area are filled."),
+      key("shape.max_blobs", p.shape.max_blobs, 1, 1024, "", "Regions that are looked at; of more, the largest."),
+      key("shape.min_blob_px", p.shape.min_blob_px, 1, 1000000, "px", "Smaller regions are not looked at."),
+      key("level_set.on", p.shape.level_set, "Refines each region from its hull by the level set."),
+      key("level_set.iterations", p.shape.level_set_config.max_iterations, 0, 1000, "",
+          "Most iterations of the level set: bounds its cost."),
+      key("level_set.margin_px", p.shape.level_set_config.margin_px, 0, 1000, "px",
+          "How far the level set may leave a region's box."),
+      key("level_set.contour_weight", p.shape.level_set_config.contour_weight, 0, 65025, "grey^2/px",
+          "Weight of the contour's length: higher gives smoother outlines."),
+
+      key("disparity.method", p.disparity.method, {{"census", MatchMethod::kCensus}, {"sad", MatchMethod::kSad}},
+          "Matching cost: census with checks and sub-pixel, or the document's mean absolute difference."),
+      key("disparity.mode", p.disparity.mode, {{"regions", DisparityMode::kRegions}, {"dense", DisparityMode::kDense}},
+          "Depth only where something moves, or for the whole picture."),
+      key("disparity.max", p.disparity.max, 1, kLargestDisparity, "px", "Largest disparity of the dense map."),
+      odd(key("disparity.block", p.disparity.block, 3, 21, "px",
+              "Side of the matching window: larger is steadier and rounds corners off.")),
+      key("disparity.reach", p.disparity.reach, 0.05, 1, "width",
+          "Largest disparity of a moving region, as a fraction of the picture's width: the nearest distance admitted."),
+      key("disparity.small_px", p.disparity.small_px, 0, 1000000, "px",
+          "Objects up to this area are matched as a whole, not pixel by pixel."),
+
+      key("shadow.method", p.shadow.method,
+          {{"stereo", ShadowMethod::kStereo}, {"chroma", ShadowMethod::kChroma}, {"off", ShadowMethod::kOff}},
+          "Shadow test: the background's own disparity first, the document's chroma test alone (3.20-3.23), or none."),
+      key("shadow.darkest_percent", p.shadow.test.darkest_percent, 1, 99, "%",
+          "Darkest light of a shadow, in percent of the lit background."),
+      key("shadow.chroma_tolerance", p.shadow.test.chroma_tolerance, 0, 255, "grey levels",
+          "How much a shadow may change Cb and Cr."),
+      key("shadow.texture_tolerance", p.shadow.test.texture_tolerance, 0, 255, "grey levels",
+          "How much a shadow may change the background's own texture."),
+      key("shadow.disparity_px", p.shadow.test.disparity_px, 0, 16, "px",
+          "Disparities this near count as the background's own."),
+      key("shadow.photometric_alone", p.shadow.test.photometric_alone,
+          "Removes shadows by their look where stereo says nothing: fewer shadows, and now and then part of an object."),
+
+      key("objects.min_area_px", p.objects.min_area_px, 1, 1000000, "px", "Smaller objects are rejected."),
+      key("objects.merge_gap", p.objects.merge_gap, 0, 2, "size",
+          "Gap across which pieces at one depth are one object, as a fraction of the larger one's longer side."),
+      key("objects.merge_depth", p.objects.merge_depth, 0, 1, "disparity",
+          "Difference in disparity up to which pieces may be one object, as a fraction of the disparity."),
+      key("objects.split_depth", p.objects.split_depth, 0.01, 1, "disparity",
+          "Gap in disparity that makes two objects of one region, as a fraction of the disparity."),
+      key("objects.split_min_px", p.objects.split_min_px, 0.5, 50, "px", "And at least this much."),
+      key("objects.split_part", p.objects.split_part, 0.01, 0.5, "area",
+          "Part of a region that a layer of depth needs to be an object."),
+      key("objects.most_scatter", p.objects.most_scatter, 0.01, 1, "disparity",
+          "Scatter of disparity, as a fraction of it, above which a new object is rejected as inconsistent."),
+      key("objects.match_noise_px", p.objects.match_noise_px, 0.02, 5, "px",
+          "Standard deviation of one disparity; depth noise follows from it."),
+
+      key("features.corner_quality", p.features.corner_quality, 1, 1000000, "grey^2",
+          "Strength from which a corner is followed as a feature."),
+      key("features.most_difference", p.features.most_difference, 1, 255, "grey levels",
+          "Difference of its patch from which a feature is lost."),
+      key("features.search_px", p.features.search_px, 1, 64, "px",
+          "Farthest from its prediction that a feature is searched."),
+
+      key("track.confirm_hits", p.track.confirm_hits, 1, 20, "frames", "Detections that confirm a target."),
+      key("track.tentative_misses", p.track.tentative_misses, 1, 10, "frames",
+          "Frames without detection that remove an unconfirmed target."),
+      key("track.coast_s", p.track.coast_s, 0, 60, "s", "How long a confirmed target lives on its prediction."),
+      key("track.gate", p.track.gate, 1, 10, "sd", "How far from its prediction a target may be found."),
+      key("track.acceleration", p.track.acceleration, 0.001, 100, "distance/s^2",
+          "Accelerations expected, as a fraction of the distance: higher follows turns, lower smooths."),
+      key("track.initial_speed", p.track.initial_speed, 0.001, 100, "distance/s",
+          "Speeds expected of a new target, as a fraction of its distance."),
+      key("track.centre_noise_px", p.track.centre_noise_px, 0.05, 20, "px", "Noise of a box centre."),
+      key("track.centre_noise_size", p.track.centre_noise_size, 0, 1, "size",
+          "What that noise grows by with the size of the box."),
+      key("track.travel_px", p.track.travel_px, 0, 100, "px",
+          "Way in the picture before a target is confirmed: tells motion from flicker."),
+  };
+}
+
+namespace {
+
+std::string section_of(const Key& key) {
+  const std::size_t dot = key.name.rfind('.');
+  return dot == std::string::npos ? std::string() : key.name.substr(0, dot);
+}
+
+std::string leaf_of(const Key& key) { return key.name.substr(key.name.rfind('.') + 1); }
+
+/// The sections in the order of the table; keys without a section first, as TOML demands.
+std::vector<std::string> sections_of(const std::vector<Key>& keys) {
+  std::vector<std::string> sections{""};
+  for (const Key& key : keys) {
+    if (std::find(sections.begin(), sections.end(), section_of(key)) == sections.end()) {
+      sections.push_back(section_of(key));
+    }
+  }
+  return sections;
+}
+
+std::string wrapped_comment(std::string_view text) {
+  constexpr std::size_t kWidth = 98;
+  std::string out;
+  while (text.size() > kWidth) {
+    std::size_t cut = text.rfind(' ', kWidth);
+    if (cut == std::string_view::npos) cut = kWidth;
+    out += "# " + std::string(text.substr(0, cut)) + "\n";
+    text.remove_prefix(std::min(text.size(), cut + 1));
+  }
+  return out + "# " + std::string(text) + "\n";
+}
+
+}  // namespace
+
+std::string to_text(const Configuration& configuration) {
+  Configuration copy = configuration;
+  const std::vector<Key> keys = keys_of(copy);
+  std::string text;
+  for (const std::string& section : sections_of(keys)) {
+    if (!section.empty()) text.append("\n[").append(section).append("]\n");
+    for (const Key& key : keys) {
+      if (section_of(key) == section) text.append(leaf_of(key)).append(" = ").append(value_text(key)).append("\n");
+    }
+  }
+  return text;
+}
+
+std::string sample_text() {
+  Configuration defaults;
+  const std::vector<Key> keys = keys_of(defaults);
+  std::string text =
+      "# stereotrack: every key with its default.\n"
+      "# Written from the table in config/schema.cpp; after a change there run\n"
+      "#     cmake --build build/release --target update_sample_config\n"
+      "# What a file says wins over the preset, and --set KEY=VALUE wins over the file. So start your own\n"
+      "# file empty and copy only the lines that you change: a full copy of this one hides the preset.\n"
+      "# Paths of keys are dotted, [source] and fps = 30.0 is the same as source.fps = 30.0.\n";
+  for (const std::string& section : sections_of(keys)) {
+    if (!section.empty()) text.append("\n[").append(section).append("]\n");
+    for (const Key& key : keys) {
+      if (section_of(key) != section) continue;
+      const std::string range = range_text(key);
+      const std::string limits = range.empty() ? "" : std::string(" Range: ").append(range).append(".");
+      text.append("\n").append(wrapped_comment(key.doc + limits));
+      text.append(leaf_of(key)).append(" = ").append(value_text(key)).append("\n");
+    }
+  }
+  return text;
+}
+
+}  // namespace stereotrack::config

@@ -1,0 +1,101 @@
+#include "drivers/capture/synthetic/scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stereotrack::capture::synthetic {
+namespace {
+
+constexpr double kNearest_m = 0.2;
+
+/// Grows a box of picture points.
+class Bounds {
+ public:
+  void add(double u, double v) noexcept {
+    left_ = std::min(left_, u);
+    right_ = std::max(right_, u);
+    top_ = std::min(top_, v);
+    bottom_ = std::max(bottom_, v);
+  }
+  /// A sphere: no point of it is seen further out than its surrounding cube's near and far face show.
+  void add_sphere(const PinholeCamera& camera, Vec3 center, double radius) noexcept {
+    const Vec3 p = camera.to_camera(center);
+    if (p.z + radius < kNearest_m) return;
+    for (const double z : {std::max(p.z - radius, kNearest_m), p.z + radius}) {
+      add(camera.f * (p.x - radius) / z + camera.cx, camera.f * (p.y - radius) / z + camera.cy);
+      add(camera.f * (p.x + radius) / z + camera.cx, camera.f * (p.y + radius) / z + camera.cy);
+    }
+  }
+  [[nodiscard]] Rect rect() const noexcept {
+    if (left_ > right_) return {};
+    const auto whole = [](double v) { return static_cast<int>(clamp(v, -1e6, 1e6)); };
+    const int left = whole(std::floor(left_));
+    const int top = whole(std::floor(top_));
+    return {left, top, whole(std::ceil(right_)) + 1 - left, whole(std::ceil(bottom_)) + 1 - top};
+  }
+
+ private:
+  double left_ = kMiss;
+  double right_ = -kMiss;
+  double top_ = kMiss;
+  double bottom_ = -kMiss;
+};
+
+}  // namespace
+
+PinholeCamera Rig::camera(int index, int width, int height) const noexcept {
+  PinholeCamera camera;
+  camera.position = {index * baseline_m, height_m, 0};
+  camera.axes = {{1, 0, 0}, {0, -cos_pitch, -sin_pitch}, {0, -sin_pitch, cos_pitch}};
+  camera.f = focal_widths * width;
+  camera.cx = 0.5 * (width - 1);
+  camera.cy = 0.5 * (height - 1);
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
+
+StereoCalibration Rig::calibration(int width, int height) const {
+  const PinholeCamera camera = this->camera(0, width, height);
+  StereoCalibration result;
+  result.left.width = width;
+  result.left.height = height;
+  result.left.fx = camera.f;
+  result.left.fy = camera.f;
+  result.left.cx = camera.cx;
+  result.left.cy = camera.cy;
+  result.right = result.left;
+  result.t_right_left = {-baseline_m, 0, 0};
+  return result;
+}
+
+Rect screen_box(const PinholeCamera& camera, Vec3 center, double radius) noexcept {
+  Bounds bounds;
+  bounds.add_sphere(camera, center, radius);
+  return bounds.rect();
+}
+
+Rect screen_box(const PinholeCamera& camera, const Shape& shape) noexcept {
+  Bounds bounds;
+  if (shape.kind == ShapeKind::kCapsule || shape.kind == ShapeKind::kCylinder) {
+    bounds.add_sphere(camera, shape.center - shape.axes.y * shape.half.y, shape.half.x);
+    bounds.add_sphere(camera, shape.center + shape.axes.y * shape.half.y, shape.half.x);
+    return bounds.rect();
+  }
+  if (shape.kind == ShapeKind::kEllipsoid) return screen_box(camera, shape.center, shape.bounding_radius);
+  int in_front = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 local{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,
+                     corner & 4 ? shape.half.z : -shape.half.z};
+    const Vec3 p = camera.to_camera(shape.center + shape.axes.to_world(local));
+    if (p.z < kNearest_m) continue;
+    ++in_front;
+    bounds.add(camera.f * p.x / p.z + camera.cx, camera.f * p.y / p.z + camera.cy);
+  }
+  if (in_front == 0) return {};
+  // A box that reaches behind the camera (the floor) can be anywhere.
+  if (in_front < 8) return {0, 0, camera.width, camera.height};
+  return bounds.rect();
+}
+
+}  // namespace stereotrack::capture::synthetic

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/capture/frame_source.hpp"
+#include "drivers/capture/synthetic/scene.hpp"
+#include "drivers/capture/synthetic/sensor.hpp"
+#include "drivers/capture/synthetic/view.hpp"
+#include "pipeline/core/rect.hpp"
+#include "pipeline/geometry/calibration.hpp"
+
+namespace stereotrack::capture {
+
+struct SyntheticOptions {
+  std::uint64_t seed = 1;
+  std::uint64_t frames = 600;  ///< 1 .. 100000
+  int width = 640;             ///< 64 .. 4096 [px]
+  int height = 480;            ///< 48 .. 3072 [px]
+  double fps = 30;             ///< 1 .. 1000
+  bool truth = false;          ///< work out ground truth for every pair
+};
+
+/// What is true of one moving object in one frame; left picture.
+struct TrueObject {
+  std::uint32_t id = 0;                  ///< from 1
+  Rect box;                              ///< of the visible pixels [px]
+  double x = 0, y = 0, z = 0;            ///< mean of the visible surface, left rectified camera frame [m]
+  int visible_px = 0;                    ///< pixels of which the object fills the most
+  int hidden_px = 0;                     ///< pixels it would fill if the other moving objects were not there, but does not
+  int whole_px = 0;                      ///< pixels of all of it, were nothing in front and the picture endless
+  [[nodiscard]] bool scored() const noexcept { return 4 * visible_px >= whole_px; }
+};
+
+struct GroundTruth {
+  static constexpr std::uint8_t kStill = 0;
+  static constexpr std::uint8_t kShadow = 50;   ///< an object's shadow on what stands still: 16 % less light, 8 % in grey
+  static constexpr std::uint8_t kMoving = 255;
+
+  std::vector<TrueObject> objects;        ///< with a visible pixel, by id
+  std::vector<std::uint8_t> labels;       ///< width x height, the constants above (those of changedetection.net)
+  std::vector<std::uint16_t> disparity;   ///< width x height, [px] x 256, of the left view; 0 = the sky
+};
+
+/// `synthetic:NAME`: a scene ray-cast into two cameras. Pictures are functions of (name, seed, size, fps, ordinal)
+/// alone, the same bits on every machine. 20 to 60 ms a pair of 640 x 480; opening takes some seconds.
+class SyntheticSource final : public FrameSource {
+ public:
+  /// Throws std::runtime_error for an unknown scene or an option out of range.
+  SyntheticSource(const std::string& name, const SyntheticOptions& options);
+
+  [[nodiscard]] const SourceInfo& info() const noexcept override { return info_; }
+  [[nodiscard]] Next next(FramePair& out) noexcept override;
+  [[nodiscard]] const std::string& skip_reason() const noexcept override { return skip_reason_; }
+  void skip_to(std::uint64_t ordinal) noexcept override { done_ = ordinal; }
+
+  /// Of the two ideal cameras; unit metres.
+  [[nodiscard]] const StereoCalibration& calibration() const noexcept { return calibration_; }
+  /// Of the last pair; empty unless asked for in the options.
+  [[nodiscard]] const GroundTruth& truth() const noexcept { return truth_; }
+
+ private:
+  void work_out_truth();
+
+  SyntheticOptions options_;
+  SourceInfo info_;
+  std::string skip_reason_;
+  StereoCalibration calibration_;
+  synthetic::Scene scene_;
+  std::vector<synthetic::View> views_;  ///< left, right
+  std::vector<synthetic::Sensor> sensors_;
+  std::vector<std::vector<std::uint8_t>> pixels_;
+
+  std::uint64_t done_ = 0;  ///< last ordinal handed out
+  std::vector<synthetic::Actor> cast_;
+  std::int64_t act_ = -1;  ///< whose cast it is
+  std::vector<synthetic::PosedActor> posed_;
+  std::size_t posed_count_ = 0;
+  GroundTruth truth_;
+  std::vector<std::uint8_t> stamp_;
+};
+
+/// NAME of `synthetic:NAME`.
+[[nodiscard]] std::unique_ptr<SyntheticSource> open_synthetic(const std::string& name, const SyntheticOptions& options = {});
+
+}  // namespace stereotrack::capture

@@ -1,0 +1,114 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+
+#include "config/error.hpp"
+#include "drivers/telemetry/endpoint.hpp"
+#include "firmware-app/stereotrack/disparity.hpp"
+#include "firmware-app/stereotrack/eval.hpp"
+#include "firmware-app/stereotrack/monitor.hpp"
+#include "firmware-app/stereotrack/replay.hpp"
+#include "firmware-app/stereotrack/synth.hpp"
+
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kBadUsage = 2;
+
+void add_rig_options(CLI::App& command, stereotrack::RigArguments& rig) {
+  command
+      .add_option("source", rig.source,
+                  "mav0 folder, KITTI folder, folder with left/ right/, sbs:FILE, LEFT,RIGHT, mono:PATH or synthetic:NAME")
+      ->required();
+  command.add_option("--calibration", rig.calibration, "calibration file; else that of the source's folder");
+  command.add_option("--config", rig.config, "configuration (TOML); else stereotrack.toml of the source's folder");
+  command.add_option("--set", rig.set, "KEY=VALUE, wins over the file; may be given again")->allow_extra_args(false);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Tracks moving objects in stereo recordings.", "stereotrack");
+  app.set_version_flag("--version", std::string("stereotrack ") + STEREOTRACK_VERSION);
+  app.require_subcommand(1);
+
+  stereotrack::ReplayArguments replay;
+  std::string replay_frames;
+  std::string pace = "max";
+  CLI::App* replay_command = app.add_subcommand("replay", "runs a recording through the tracker");
+  add_rig_options(*replay_command, replay.rig);
+  replay_command->add_option("--out", replay.out, "folder for tracks.csv, summary.json, telemetry.bin");
+  replay_command->add_option("--render", replay.render, "FILE.mp4, or a folder for PNG pictures");
+  replay_command->add_option("--pace", pace, "max: as fast as it goes; real: in real time, with telemetry over UDP")
+      ->check(CLI::IsMember({"max", "real"}));
+  replay_command->add_option("--frames", replay_frames, "A:B, ordinals from 1, both included");
+
+  stereotrack::MasksArguments masks;
+  std::string masks_frames;
+  CLI::App* masks_command = app.add_subcommand("masks", "writes the foreground masks of a recording");
+  add_rig_options(*masks_command, masks.rig);
+  masks_command->add_option("--out", masks.out, "folder for %06d.png")->required();
+  masks_command->add_option("--frames", masks_frames, "A:B, ordinals from 1, both included");
+
+  stereotrack::SynthArguments synth;
+  CLI::App* synth_command = app.add_subcommand("synth", "writes a synthetic stereo sequence with ground truth");
+  stereotrack::add_options(*synth_command, synth);
+
+  stereotrack::EvalArguments eval;
+  CLI::App* eval_command = app.add_subcommand("eval", "scores tracks against ground truth: HOTA, MOTA, IDF1, 3-D error");
+  eval_command->add_option("--truth", eval.truth, "ground truth, MOT columns")->required();
+  eval_command->add_option("--tracks", eval.tracks, "tracks, MOT columns")->required();
+  eval_command->add_flag("--json", eval.json, "one JSON object instead of the table");
+
+  stereotrack::DisparityArguments disparity;
+  CLI::App* disparity_command = app.add_subcommand("disparity", "dense disparity of a rectified pair");
+  disparity_command->add_option("left", disparity.left, "left picture")->required();
+  disparity_command->add_option("right", disparity.right, "right picture")->required();
+  disparity_command->add_option("--out", disparity.out, "FILE.png, 16 bit, disparity x 256, 0 = none")->required();
+  disparity_command->add_option("--config", disparity.config, "configuration (TOML)");
+  disparity_command->add_option("--set", disparity.set, "KEY=VALUE")->allow_extra_args(false);
+
+  stereotrack::MonitorArguments monitor;
+  CLI::App* monitor_command = app.add_subcommand("monitor", "receives and shows the telemetry");
+  monitor_command->add_option("--listen", monitor.listen, "ADDR:PORT")->capture_default_str();
+  monitor_command->add_flag("--json", monitor.json, "one JSON object a datagram");
+  monitor_command->add_option("--count", monitor.count, "end after so many pairs");
+  monitor_command->add_option("--timeout", monitor.timeout_s, "fail if nothing comes for so many seconds");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::cerr << "stereotrack: " << error.what() << " (see stereotrack --help)\n";
+    return kBadUsage;
+  }
+  if (*replay_command) {
+    replay.real_time = pace == "real";
+    if (!replay_frames.empty()) replay.frames = stereotrack::parse_frames(replay_frames);
+    return stereotrack::run_replay(replay, std::cout, std::cerr);
+  }
+  if (*masks_command) {
+    if (!masks_frames.empty()) masks.frames = stereotrack::parse_frames(masks_frames);
+    return stereotrack::run_masks(masks, std::cerr);
+  }
+  if (*synth_command) return stereotrack::run_synth(synth, std::cerr);
+  if (*eval_command) return stereotrack::run_eval(eval, std::cout);
+  if (*disparity_command) return stereotrack::run_disparity(disparity, std::cerr);
+  monitor.live = isatty(STDOUT_FILENO) == 1;
+  return stereotrack::run_monitor(monitor, std::cout, std::cerr);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const stereotrack::config::Error& error) {
+    std::cerr << "stereotrack: " << error.what() << '\n';
+    return kBadUsage;
+  } catch (const stereotrack::telemetry::EndpointError& error) {
+    std::cerr << "stereotrack: " << error.what() << '\n';
+    return kBadUsage;
+  } catch (const std::exception& error) {
+    std::cerr << "stereotrack: " << error.what() << '\n';
+    return kFailed;
+  }
+}

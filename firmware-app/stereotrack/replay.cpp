@@ -1,0 +1,293 @@
+#include "firmware-app/stereotrack/replay.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <ostream>
+#include <stdexcept>
+#include <thread>
+
+#include "config/schema.hpp"
+#include "drivers/telemetry/encoder.hpp"
+#include "drivers/telemetry/file_sink.hpp"
+#include "drivers/telemetry/udp_sender.hpp"
+#include "firmware-app/render/renderer.hpp"
+#include "firmware-app/runtime/allocation_count.hpp"
+#include "firmware-app/stereotrack/interrupt.hpp"
+#include "firmware-app/stereotrack/output_file.hpp"
+#include "firmware-app/stereotrack/progress.hpp"
+#include "firmware-app/stereotrack/summary.hpp"
+#include "firmware-app/stereotrack/tracks_file.hpp"
+
+namespace stereotrack {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Frames until caches and first pages are warm; heap calls count from then on.
+constexpr std::uint64_t kWarmUpFrames = 10;
+constexpr std::size_t kMostReasons = 100;
+// Identities of a replay: fixed, so that the same file gives the same bytes.
+constexpr std::uint64_t kReplaySession = 1;
+
+std::uint32_t telemetry_flags(std::uint32_t flags, bool skipped_before) {
+  std::uint32_t out = 0;
+  if ((flags & kFlagMono) != 0) out |= telemetry::kMono;
+  if ((flags & kFlagNoColour) != 0) out |= telemetry::kNoColour;
+  if ((flags & kFlagLearning) != 0) out |= telemetry::kBackgroundLearning;
+  if ((flags & kFlagLightChange) != 0) out |= telemetry::kLightChange;
+  if (skipped_before) out |= telemetry::kFramesSkippedBefore;
+  return out;
+}
+
+// Holds each pair back until its capture time plus the latency has come, counted from the first pair.
+class Pacer {
+ public:
+  // True if the moment was already over: a missed deadline.
+  bool wait(CaptureTime send_time) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!started_) {
+      started_ = true;
+      origin_ = now;
+      first_ = send_time;
+    }
+    const auto due = origin_ + (send_time - first_);
+    if (now > due) return true;
+    std::this_thread::sleep_until(due);
+    return false;
+  }
+
+ private:
+  bool started_ = false;
+  std::chrono::steady_clock::time_point origin_;
+  CaptureTime first_;
+};
+
+// Everything that one replay carries from frame to frame.
+class Replay {
+ public:
+  Replay(const ReplayArguments& arguments, std::ostream& messages)
+      : arguments_(arguments),
+        messages_(messages),
+        rig_(open_rig(arguments.rig)),
+        pipeline_(make_pipeline(rig_, arena_, times_.observer())),
+        encoder_({.rig = rig_.configuration().telemetry.rig_id, .session = kReplaySession}) {
+    arena_.seal();
+    if (arguments.out) {
+      make_output_folder(*arguments.out);
+      file_ = std::make_unique<telemetry::FileSink>(fs::path(*arguments.out) / "telemetry.bin");
+    }
+    if (arguments.real_time) open_senders();
+    if (arguments.render) {
+      renderer_ = render::make_renderer(*arguments.render, rig_.source->info(), pipeline_.rectifier(), rig_.unit_m);
+    }
+    summary_.source = arguments.rig.source;
+    summary_.memory_bytes = arena_.bytes_used();
+    summary_.configuration = config::to_text(rig_.configuration());
+  }
+
+  // False if it was interrupted.
+  bool run() {
+    catch_interrupts();
+    const capture::SourceInfo& info = rig_.source->info();
+    if (info.format == PixelFormat::kGrey8) messages_ << info.name << ": grey source, the chroma tests are skipped\n";
+    if (!info.stereo) messages_ << info.name << ": mono source, 2-D tracks without distance\n";
+    if (arguments_.frames.first > 1) rig_.source->skip_to(arguments_.frames.first - 1);
+    std::optional<std::uint64_t> expected;
+    if (info.pairs) expected = std::min(*info.pairs, arguments_.frames.last) - std::min(*info.pairs, arguments_.frames.first - 1);
+    Progress progress(messages_, expected);
+    FramePair pair;
+    while (!interrupted()) {
+      const capture::Next next = rig_.source->next(pair);
+      if (next == capture::Next::kEnd || pair.ordinal > arguments_.frames.last) break;
+      if (next == capture::Next::kSkipped) {
+        skip(progress);
+      } else {
+        process(pair);
+      }
+      progress.step();
+    }
+    progress.finish();
+    return !interrupted();
+  }
+
+  void save() {
+    if (summary_.frames == 0) {
+      throw std::runtime_error(rig_.source->info().name + ": no pair could be read in the frames asked for (" +
+                               std::to_string(summary_.skipped) + " skipped)");
+    }
+    if (renderer_) renderer_->commit();
+    summary_.tracks = tracks_.tracks();
+    summary_.rows = tracks_.rows();
+    summary_.pixels_hash = pixels_.hex();
+    summary_.telemetry_hash = payloads_.hex();
+    if (udp_) {
+      summary_.telemetry_dropped = udp_->counters().dropped;
+      summary_.telemetry_failed = udp_->counters().failed;
+    }
+    if (!arguments_.out) return;
+    const fs::path folder = *arguments_.out;
+    tracks_.save(folder / "tracks.csv");
+    if (!file_->commit()) throw std::runtime_error(file_->status());
+    save_summary(folder / "summary.json", summary_, &times_);
+  }
+
+  void print(std::ostream& out) const {
+    char line[256];
+    const auto whole = times_.whole();
+    (void)std::snprintf(line, sizeof line,
+                        "%llu pairs, %llu skipped, %llu tracks, %llu rows; pipeline p50 %.2f ms, p99 %.2f ms, max %.2f ms\n",
+                        static_cast<unsigned long long>(summary_.frames),
+                        static_cast<unsigned long long>(summary_.skipped),
+                        static_cast<unsigned long long>(tracks_.tracks()),
+                        static_cast<unsigned long long>(tracks_.rows()), whole.p50_ms, whole.p99_ms, whole.max_ms);
+    out << line;
+    out << "rejected candidates:";
+    for (std::size_t i = 0; i < kRejections; ++i) {
+      out << ' ' << to_string(static_cast<Rejection>(i)) << ' ' << summary_.rejections[i];
+    }
+    out << '\n';
+    if (arguments_.out) out << "written: " << *arguments_.out << "/tracks.csv summary.json telemetry.bin\n";
+    if (arguments_.render) out << "rendered: " << *arguments_.render << '\n';
+  }
+
+ private:
+  void open_senders() {
+    std::vector<telemetry::Endpoint> destinations;
+    for (const std::string& text : rig_.configuration().telemetry.destinations) {
+      destinations.push_back(telemetry::parse_endpoint(text));
+    }
+    if (destinations.empty()) {
+      destinations.push_back(telemetry::parse_endpoint("127.0.0.1:" + std::to_string(telemetry::kDefaultPort)));
+    }
+    udp_ = std::make_unique<telemetry::UdpSender>(destinations);
+  }
+
+  void skip(Progress& progress) {
+    ++summary_.skipped;
+    skipped_before_ = true;
+    if (summary_.skip_reasons.size() < kMostReasons) summary_.skip_reasons.push_back(rig_.source->skip_reason());
+    progress.message("skipped: " + rig_.source->skip_reason());
+  }
+
+  void process(const FramePair& pair) {
+    pixels_.add(pair.left);
+    if (!pair.right.empty()) pixels_.add(pair.right);
+    const std::uint64_t before = allocations_of_this_thread();
+    times_.frame_begins();
+    const Result<FrameResult> result = pipeline_.run(pair);
+    if (!result.has_value()) {
+      throw std::runtime_error(rig_.source->info().name + ": pair " + std::to_string(pair.ordinal) + ": " +
+                               to_string(result.error()));
+    }
+    if (summary_.frames >= kWarmUpFrames) summary_.allocations_after_warmup += allocations_of_this_thread() - before;
+    ++summary_.frames;
+    summary_.flags |= result->flags;
+    for (std::size_t i = 0; i < kRejections; ++i) summary_.rejections[i] += result->rejections[i];
+    tracks_.add(pair.ordinal, result->tracks);
+    publish(pair, *result);
+    if (renderer_) renderer_->draw(pair, *result);
+    skipped_before_ = false;
+  }
+
+  void publish(const FramePair& pair, const FrameResult& result) {
+    const auto latency = std::chrono::nanoseconds(
+        static_cast<std::int64_t>(rig_.configuration().latency.output_ms * 1e6 + 0.5));
+    telemetry::Message message;
+    message.tracks = result.tracks;
+    message.ordinal = pair.ordinal;
+    message.capture_time = pair.capture_time;
+    message.send_time = pair.capture_time + latency;
+    message.latency = latency;
+    message.flags = telemetry_flags(result.flags, skipped_before_);
+    message.frames_skipped = static_cast<std::uint32_t>(summary_.skipped);
+    message.unit_m = rig_.unit_m;
+    if (rig_.calibration) {
+      message.focal_x_px = rig_.calibration->left.fx;
+      message.focal_y_px = rig_.calibration->left.fy;
+    }
+    if (arguments_.real_time && pacer_.wait(message.send_time)) {
+      ++summary_.deadline_misses;
+      message.flags |= telemetry::kLate;
+    }
+    for (const std::span<const std::byte> datagram : encoder_.encode(message, buffer_)) {
+      payloads_.add(datagram);
+      ++summary_.telemetry_sent;
+      if (file_) file_->send(datagram);
+      if (udp_) udp_->send(datagram);
+    }
+  }
+
+  const ReplayArguments& arguments_;
+  std::ostream& messages_;
+  Rig rig_;
+  StageTimes times_;
+  Arena arena_;
+  Pipeline pipeline_;
+  telemetry::Encoder encoder_;
+  std::array<std::byte, telemetry::kMaxMessageBytes> buffer_{};
+  std::unique_ptr<telemetry::FileSink> file_;
+  std::unique_ptr<telemetry::UdpSender> udp_;
+  std::unique_ptr<render::Renderer> renderer_;
+  Pacer pacer_;
+  Digest pixels_;
+  Digest payloads_;
+  TracksFile tracks_;
+  Summary summary_;
+  bool skipped_before_ = false;
+};
+
+}  // namespace
+
+int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream& messages) {
+  Replay replay(arguments, messages);
+  if (!replay.run()) {
+    throw std::runtime_error(arguments.rig.source + ": interrupted; nothing was written");
+  }
+  replay.save();
+  replay.print(out);
+  return 0;
+}
+
+int run_masks(const MasksArguments& arguments, std::ostream& messages) {
+  const Rig rig = open_rig(arguments.rig);
+  Arena arena;
+  Pipeline pipeline = make_pipeline(rig, arena);
+  make_output_folder(arguments.out);
+  catch_interrupts();
+  const capture::SourceInfo& info = rig.source->info();
+  if (arguments.frames.first > 1) rig.source->skip_to(arguments.frames.first - 1);
+  Progress progress(messages, info.pairs);
+  FramePair pair;
+  while (!interrupted()) {
+    const capture::Next next = rig.source->next(pair);
+    if (next == capture::Next::kEnd || pair.ordinal > arguments.frames.last) break;
+    cv::Mat picture = cv::Mat::zeros(info.height, info.width, CV_8UC1);
+    if (next == capture::Next::kSkipped) {
+      progress.message("skipped, mask left empty: " + rig.source->skip_reason());
+    } else {
+      const Result<FrameResult> result = pipeline.run(pair);
+      if (!result.has_value()) {
+        throw std::runtime_error(info.name + ": pair " + std::to_string(pair.ordinal) + ": " + to_string(result.error()));
+      }
+      for (int y = 0; y < info.height; ++y) std::copy_n(result->mask.row(y), info.width, picture.ptr(y));
+    }
+    char name[32];
+    (void)std::snprintf(name, sizeof name, "%06llu.png", static_cast<unsigned long long>(pair.ordinal));
+    std::vector<std::uint8_t> bytes;
+    (void)cv::imencode(".png", picture, bytes);
+    OutputFile file(fs::path(arguments.out) / name);
+    file.write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    file.commit();
+    progress.step();
+  }
+  progress.finish();
+  if (interrupted()) throw std::runtime_error(arguments.rig.source + ": interrupted; the masks so far are whole");
+  return 0;
+}
+
+}  // namespace stereotrack

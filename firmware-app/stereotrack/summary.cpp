@@ -1,0 +1,122 @@
+#include "firmware-app/stereotrack/summary.hpp"
+
+#include <sodium.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "firmware-app/runtime/allocation_count.hpp"
+#include "firmware-app/stereotrack/output_file.hpp"
+
+namespace stereotrack {
+
+namespace {
+
+StageTimes::Percentiles percentiles(std::vector<double> ms) {
+  if (ms.empty()) return {};
+  std::sort(ms.begin(), ms.end());
+  const auto at = [&](double part) {
+    return ms[std::min(static_cast<std::size_t>(part * static_cast<double>(ms.size())), ms.size() - 1)];
+  };
+  return {at(0.5), at(0.99), ms.back()};
+}
+
+nlohmann::ordered_json json_of(const StageTimes::Percentiles& p) {
+  return {{"p50", p.p50_ms}, {"p99", p.p99_ms}, {"max", p.max_ms}};
+}
+
+}  // namespace
+
+Digest::Digest() : state_(new crypto_generichash_blake2b_state) {
+  (void)crypto_generichash_blake2b_init(state_, nullptr, 0, crypto_generichash_blake2b_BYTES);
+}
+Digest::~Digest() { delete state_; }
+
+void Digest::add(std::span<const std::byte> bytes) noexcept {
+  (void)crypto_generichash_blake2b_update(state_, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+}
+
+void Digest::add(const Picture& picture) noexcept {
+  const std::array<std::uint32_t, 3> head{static_cast<std::uint32_t>(picture.width),
+                                          static_cast<std::uint32_t>(picture.height),
+                                          static_cast<std::uint32_t>(picture.format)};
+  add(std::as_bytes(std::span(head)));
+  const auto row_bytes = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(bytes_per_pixel(picture.format));
+  for (int y = 0; y < picture.height; ++y) add(std::as_bytes(std::span(picture.row(y), row_bytes)));
+}
+
+std::string Digest::hex() const {
+  crypto_generichash_blake2b_state copy = *state_;
+  std::array<unsigned char, crypto_generichash_blake2b_BYTES> digest{};
+  (void)crypto_generichash_blake2b_final(&copy, digest.data(), digest.size());
+  std::string text;
+  for (const unsigned char byte : digest) {
+    constexpr const char* kDigits = "0123456789abcdef";
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
+}
+
+void StageTimes::stage_ended(void* context, Stage stage) noexcept {
+  auto& self = *static_cast<StageTimes*>(context);
+  const auto now = std::chrono::steady_clock::now();
+  self.ms_[static_cast<std::size_t>(stage)].push_back(
+      std::chrono::duration<double, std::milli>(now - self.last_).count());
+  self.last_ = now;
+}
+
+StageTimes::Percentiles StageTimes::of(Stage stage) const { return percentiles(ms_[static_cast<std::size_t>(stage)]); }
+
+StageTimes::Percentiles StageTimes::whole() const {
+  std::vector<double> sum = ms_[0];
+  for (std::size_t stage = 1; stage < kStages; ++stage) {
+    for (std::size_t i = 0; i < sum.size() && i < ms_[stage].size(); ++i) sum[i] += ms_[stage][i];
+  }
+  return percentiles(std::move(sum));
+}
+
+void save_summary(const std::filesystem::path& path, const Summary& summary, const StageTimes* times) {
+  nlohmann::ordered_json json;
+  json["source"] = summary.source;
+  json["frames"] = summary.frames;
+  json["drops"] = {{"unreadable", summary.skipped},
+                   {"telemetry_full_socket", summary.telemetry_dropped},
+                   {"telemetry_failed", summary.telemetry_failed}};
+  json["skipped"] = summary.skip_reasons;
+  json["tracks"] = summary.tracks;
+  json["rows"] = summary.rows;
+  json["deadline_misses"] = summary.deadline_misses;
+  json["mono"] = (summary.flags & kFlagMono) != 0;
+  json["colour"] = (summary.flags & kFlagNoColour) == 0;
+  json["light_changes"] = (summary.flags & kFlagLightChange) != 0;
+  nlohmann::ordered_json rejected;
+  for (std::size_t i = 0; i < kRejections; ++i) {
+    rejected[to_string(static_cast<Rejection>(i))] = summary.rejections[i];
+  }
+  json["candidates_rejected"] = rejected;
+  json["telemetry_datagrams"] = summary.telemetry_sent;
+  if (allocations_are_counted()) {
+    json["allocations_after_warmup"] = summary.allocations_after_warmup;
+  } else {
+    json["allocations_after_warmup"] = nullptr;
+  }
+  json["memory_bytes"] = summary.memory_bytes;
+  json["pixels_blake2b"] = summary.pixels_hash;
+  json["telemetry_blake2b"] = summary.telemetry_hash;
+  json["configuration"] = summary.configuration;
+  if (times != nullptr) {
+    nlohmann::ordered_json stages;
+    for (std::size_t i = 0; i < kStages; ++i) {
+      const auto stage = static_cast<Stage>(i);
+      stages[to_string(stage)] = json_of(times->of(stage));
+    }
+    stages["whole"] = json_of(times->whole());
+    json["stages_ms"] = stages;
+  }
+  OutputFile file(path);
+  file.write(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  file.commit();
+}
+
+}  // namespace stereotrack

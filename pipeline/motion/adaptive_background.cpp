@@ -1,0 +1,221 @@
+#include "pipeline/motion/adaptive_background.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+
+namespace stereotrack {
+
+namespace {
+
+// A fresh pixel's deviation [8.8] and how many frames that guess weighs: one frame says nothing about noise.
+constexpr int kPriorDeviation = 3 * 256;
+constexpr int kPriorFrames = 8;
+// Grid of the gain estimate and its histogram: ratios 1/4 .. 4 around 256.
+constexpr int kGainStep = 3;
+constexpr int kGainBins = 1024;
+constexpr int kGainDarkest = 20;  // below, the ratio is mostly noise
+// How far a pixel may be from its candidate and still be the same look [8.8].
+constexpr int kCandidateReach = 12 * 256;
+
+int rounded(std::uint16_t fixed) noexcept { return std::min((fixed + 128) >> 8, 255); }
+
+}  // namespace
+
+Result<AdaptiveBackground> AdaptiveBackground::create(const Config& config, int width, int height, bool colour,
+                                                      Arena& arena) noexcept {
+  if (config.window < 2 || config.window > 1024 || config.absorb_frames < 2 || config.absorb_frames > 60000 ||
+      config.noise_floor < 1 || config.noise_floor > 4096 || config.edge_percent < 0 || config.edge_percent > 200 ||
+      config.relearn_percent < 1 || config.relearn_percent > 100) {
+    return fail(Fault::kBadConfig);
+  }
+  if (width < 1 || height < 1) return fail(Fault::kBadSize);
+  AdaptiveBackground self;
+  self.config_ = config;
+  self.colour_ = colour;
+  const auto make = [&](Channel& channel) {
+    channel.mean = arena.image<std::uint16_t>(width, height);
+    channel.deviation = arena.image<std::uint16_t>(width, height);
+    channel.candidate = arena.image<std::uint16_t>(width, height);
+    channel.shown = arena.image<std::uint8_t>(width, height);
+  };
+  make(self.y_);
+  if (colour) {
+    make(self.cb_);
+    make(self.cr_);
+  }
+  self.age_ = arena.image<std::uint16_t>(width, height);
+  self.candidate_age_ = arena.image<std::uint16_t>(width, height);
+  self.luma_ = arena.image<std::uint8_t>(width, height);
+  self.range_ = arena.image<std::uint8_t>(width, height);
+  self.foreground_ = arena.image<std::uint8_t>(width, height);
+  if (arena.failed()) return fail(Fault::kOutOfMemory);
+  return self;
+}
+
+int AdaptiveBackground::estimate_gain(ImageView<const std::uint8_t> y) const noexcept {
+  std::array<std::uint32_t, kGainBins> histogram{};
+  std::uint32_t total = 0;
+  for (int v = 0; v < y.height; v += kGainStep) {
+    for (int u = 0; u < y.width; u += kGainStep) {
+      const int background = y_.mean.at(u, v) >> 8;
+      const int now = y.at(u, v);
+      if (background < kGainDarkest || now < 4 || now > 250 || background > 250 || foreground_.at(u, v) != 0) continue;
+      ++histogram[static_cast<std::size_t>(std::min((now * 256 + background / 2) / background, kGainBins - 1))];
+      ++total;
+    }
+  }
+  if (total < 64) return 256;
+  // The median, refined inside its neighbourhood: the mean of the ratios near it is finer than a bin.
+  std::uint32_t below = 0;
+  int median = 0;
+  while (below + histogram[static_cast<std::size_t>(median)] <= total / 2) {
+    below += histogram[static_cast<std::size_t>(median)];
+    ++median;
+  }
+  return std::clamp(median, 64, 1023);
+}
+
+void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t> out) noexcept {
+  const int width = out.width;
+  const int height = out.height;
+  if (seen_ == 0) {
+    for (int y = 0; y < height; ++y) std::fill_n(out.row(y), width, std::uint8_t{0});
+    return;
+  }
+  gain_ = estimate_gain(picture.y);
+  for (int y = 0; y < height; ++y) {
+    const std::uint16_t* mean = y_.mean.row(y);
+    std::uint8_t* luma = luma_.row(y);
+    for (int x = 0; x < width; ++x) {
+      luma[x] = static_cast<std::uint8_t>(std::min((mean[x] * gain_ + (1 << 15)) >> 16, 255));
+    }
+    if (colour_) {
+      for (int x = 0; x < width; ++x) cb_.shown.at(x, y) = static_cast<std::uint8_t>(rounded(cb_.mean.at(x, y)));
+      for (int x = 0; x < width; ++x) cr_.shown.at(x, y) = static_cast<std::uint8_t>(rounded(cr_.mean.at(x, y)));
+    }
+  }
+  for (int y = 0; y < height; ++y) {
+    const int above = std::max(y - 1, 0);
+    const int under = std::min(y + 1, height - 1);
+    for (int x = 0; x < width; ++x) {
+      const int before = std::max(x - 1, 0);
+      const int after = std::min(x + 1, width - 1);
+      int low = 255;
+      int high = 0;
+      for (int v = above; v <= under; ++v) {
+        const std::uint8_t* row = luma_.row(v);
+        for (int u = before; u <= after; ++u) {
+          low = std::min<int>(low, row[u]);
+          high = std::max<int>(high, row[u]);
+        }
+      }
+      range_.at(x, y) = static_cast<std::uint8_t>(high - low);
+    }
+  }
+  for (int y = 0; y < height; ++y) {
+    std::uint8_t* result = out.row(y);
+    for (int x = 0; x < width; ++x) {
+      const int tolerance = range_.at(x, y) * config_.edge_percent * 256 / 100;
+      const int apart = std::abs((picture.y.at(x, y) << 8) - ((y_.mean.at(x, y) * gain_) >> 8));
+      const int noise = y_.deviation.at(x, y) * 5 / 4 + config_.noise_floor;
+      const int luma = std::max(apart - tolerance, 0) * 8 / noise;
+      int colour = 0;
+      if (colour_) {
+        const int blue = std::abs((picture.cb.at(x, y) << 8) - cb_.mean.at(x, y)) * 8 /
+                         (cb_.deviation.at(x, y) * 5 / 4 + config_.noise_floor);
+        const int red = std::abs((picture.cr.at(x, y) << 8) - cr_.mean.at(x, y)) * 8 /
+                        (cr_.deviation.at(x, y) * 5 / 4 + config_.noise_floor);
+        colour = std::max(blue, red);
+      }
+      result[x] = static_cast<std::uint8_t>(std::min(std::max(luma, colour) + std::min(luma, colour) / 2, 255));
+    }
+  }
+}
+
+void AdaptiveBackground::blend(Channel& channel, int x, int y, std::uint8_t value, int rate) noexcept {
+  const int now = value << 8;
+  std::uint16_t& mean = channel.mean.at(x, y);
+  const int apart = now - mean;
+  std::uint16_t& deviation = channel.deviation.at(x, y);
+  mean = static_cast<std::uint16_t>(mean + apart / rate);
+  deviation = static_cast<std::uint16_t>(deviation + (std::abs(apart) - deviation) / (rate + kPriorFrames));
+}
+
+bool AdaptiveBackground::near_candidate(const Planes& picture, int x, int y) const noexcept {
+  if (std::abs((picture.y.at(x, y) << 8) - y_.candidate.at(x, y)) > kCandidateReach) return false;
+  return !colour_ || (std::abs((picture.cb.at(x, y) << 8) - cb_.candidate.at(x, y)) <= kCandidateReach &&
+                      std::abs((picture.cr.at(x, y) << 8) - cr_.candidate.at(x, y)) <= kCandidateReach);
+}
+
+void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8_t> mask) noexcept {
+  const int absorb = config_.absorb_frames;
+  const auto each_channel = [&](auto&& act) {
+    act(y_, picture.y);
+    if (colour_) {
+      act(cb_, picture.cb);
+      act(cr_, picture.cr);
+    }
+  };
+  std::uint64_t changed = 0;
+  for (int y = 0; y < age_.height; ++y) {
+    for (int x = 0; x < age_.width; ++x) {
+      std::uint16_t& age = age_.at(x, y);
+      std::uint16_t& candidate_age = candidate_age_.at(x, y);
+      foreground_.at(x, y) = seen_ > 0 ? mask.at(x, y) : std::uint8_t{0};
+      if (age == 0) {
+        each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
+          channel.mean.at(x, y) = static_cast<std::uint16_t>(plane.at(x, y) << 8);
+          channel.deviation.at(x, y) = kPriorDeviation;
+        });
+        age = 1;
+        candidate_age = 0;
+        continue;
+      }
+      if (mask.at(x, y) == 0) {
+        const int rate = std::min(age + 1, config_.window);
+        each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
+          blend(channel, x, y, plane.at(x, y), rate);
+        });
+        age = static_cast<std::uint16_t>(std::min(age + 1, absorb));
+        if (candidate_age > 0) --candidate_age;
+        continue;
+      }
+      ++changed;
+      if (candidate_age == 0 || !near_candidate(picture, x, y)) {
+        each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
+          channel.candidate.at(x, y) = static_cast<std::uint16_t>(plane.at(x, y) << 8);
+        });
+        candidate_age = 1;
+        continue;
+      }
+      ++candidate_age;
+      each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
+        std::uint16_t& candidate = channel.candidate.at(x, y);
+        const int apart = (plane.at(x, y) << 8) - candidate;
+        candidate = static_cast<std::uint16_t>(candidate + apart / std::min<int>(candidate_age, config_.window));
+      });
+      // A look must last at least kPriorFrames: a slow object in the first frames is no background.
+      if (candidate_age > std::max<int>(age, kPriorFrames) || candidate_age >= absorb) {
+        each_channel([&](Channel& channel, ImageView<const std::uint8_t>) {
+          std::swap(channel.mean.at(x, y), channel.candidate.at(x, y));
+          channel.deviation.at(x, y) = kPriorDeviation;
+        });
+        std::swap(age, candidate_age);
+        candidate_age = static_cast<std::uint16_t>(candidate_age / 2);
+      }
+    }
+  }
+  ++seen_;
+  const auto pixels = static_cast<std::uint64_t>(age_.width) * static_cast<std::uint64_t>(age_.height);
+  if (changed * 100 > pixels * static_cast<std::uint64_t>(config_.relearn_percent)) restart();
+}
+
+void AdaptiveBackground::restart() noexcept {
+  for (int y = 0; y < age_.height; ++y) {
+    std::fill_n(age_.row(y), age_.width, std::uint16_t{0});
+    std::fill_n(candidate_age_.row(y), age_.width, std::uint16_t{0});
+  }
+}
+
+}  // namespace stereotrack

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/result.hpp"
+
+namespace stereotrack {
+
+/// Background of the robust preset: what each pixel usually looks like, how much that varies, and how far
+/// the present picture is from it. In place of (3.7) and (3.8).
+///
+/// Per pixel: mean m of luma (and of Cb, Cr), mean absolute deviation a of each, number of frames n in which
+/// the pixel looked so, and one candidate: another look, seen lately, with its own count. On a pixel that
+/// is not foreground
+///     m <- m + (x - m) / r,   a <- a + (|x - m| - a) / r,   r = min(n + 1, window)
+/// so the first frames give the plain mean (3.7) and later ones an exponential window. On a foreground pixel
+/// the candidate learns instead. When the candidate has been seen more often than the background (counts
+/// saturate at absorb_frames), they change places: what was there at start and left, dissolves quickly; what
+/// stops in view, is absorbed after absorb_frames.
+///
+/// Distance of a picture from the background, in standard deviations, 8 steps each:
+///     z = 8 max(0, |x - g m| - e R) / (1.25 a + floor)
+/// g: gain of the light (median ratio of picture and background over the pixels not lately foreground), so
+/// that exposure drift is no motion; R: range of m in the 3x3 neighbourhood, so that an edge which moves by
+/// a fraction e of a pixel is no motion either. Channels combine as max + half the smaller.
+///
+/// The pictures given should be smoothed a little (3x3): then a is the noise that remains.
+/// Integers only (8.8 fixed point). One instance a view; one thread; O(pixels).
+class AdaptiveBackground {
+ public:
+  struct Config {
+    int window = 60;            ///< frames of the exponential window, 2..1024
+    int absorb_frames = 300;    ///< frames after which what stands still is background, 2..60000
+    int noise_floor = 256;      ///< added to the standard deviation [1/256 grey level], 1..4096
+    int edge_percent = 40;      ///< e: tolerated shift of an edge [% of the 3x3 range], 0..200
+    int relearn_percent = 60;   ///< part of the picture that must change at once to start anew, 1..100
+  };
+
+  /// colour: whether Cb and Cr are given. Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<AdaptiveBackground> create(const Config& config, int width, int height, bool colour,
+                                                         Arena& arena) noexcept;
+
+  /// Planes of one picture; cb and cr empty for a grey one.
+  struct Planes {
+    ImageView<const std::uint8_t> y;
+    ImageView<const std::uint8_t> cb;
+    ImageView<const std::uint8_t> cr;
+  };
+
+  /// Distance of the picture from the background, 8 steps a standard deviation, saturated at 255. All 0 before
+  /// the first learn(). Also estimates the light's gain.
+  void distance(const Planes& picture, ImageView<std::uint8_t> out) noexcept;
+
+  /// Learns from the picture that distance() saw; mask: 255 = foreground, not to be learnt as background.
+  void learn(const Planes& picture, ImageView<const std::uint8_t> mask) noexcept;
+
+  /// Forgets everything but the latest look: the next learn() starts a new mean.
+  void restart() noexcept;
+
+  /// The background's luma under the present light [grey levels]; valid after distance().
+  [[nodiscard]] ImageView<const std::uint8_t> luma() const noexcept { return luma_; }
+  [[nodiscard]] ImageView<const std::uint8_t> blue() const noexcept { return cb_.shown; }
+  [[nodiscard]] ImageView<const std::uint8_t> red() const noexcept { return cr_.shown; }
+  /// Gain of the light against the background, 256 = unchanged.
+  [[nodiscard]] int gain() const noexcept { return gain_; }
+  [[nodiscard]] int seen() const noexcept { return seen_; }
+
+ private:
+  struct Channel {
+    ImageView<std::uint16_t> mean;       // 8.8
+    ImageView<std::uint16_t> deviation;  // 8.8
+    ImageView<std::uint16_t> candidate;  // 8.8
+    ImageView<std::uint8_t> shown;       // mean under the present light, rounded
+  };
+
+  int estimate_gain(ImageView<const std::uint8_t> y) const noexcept;
+  static void blend(Channel& channel, int x, int y, std::uint8_t value, int rate) noexcept;
+  bool near_candidate(const Planes& picture, int x, int y) const noexcept;
+
+  Config config_;
+  bool colour_ = false;
+  int seen_ = 0;
+  int gain_ = 256;
+  Channel y_;
+  Channel cb_;
+  Channel cr_;
+  ImageView<std::uint16_t> age_;
+  ImageView<std::uint16_t> candidate_age_;
+  ImageView<std::uint8_t> luma_;
+  ImageView<std::uint8_t> range_;
+  ImageView<std::uint8_t> foreground_;
+};
+
+}  // namespace stereotrack

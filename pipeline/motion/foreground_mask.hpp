@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/result.hpp"
+#include "pipeline/shape/blob_extractor.hpp"
+
+namespace stereotrack {
+
+/// Foreground of the robust preset: from the distance to the background (AdaptiveBackground) to a mask.
+/// 1. a pixel is a candidate from `low` on, a seed from `high` on;
+/// 2. halo: smoothing and blur spread a strong object over its rim. A candidate under halo_percent of the
+///    largest distance within 2 px is rim, not object;
+/// 3. a pixel stays if most of its 3x3 neighbourhood are candidates, which removes single noisy pixels;
+/// 4. components without enough seeds go: weak pixels count only where they hang on strong ones.
+/// In: distance, u8, 8 steps a standard deviation. Out: 0 or 255, same size. O(pixels). One instance a thread.
+class ForegroundMask {
+ public:
+  struct Config {
+    double low_sd = 4.0;    ///< candidate [standard deviations], 0.5..30
+    double high_sd = 8.0;   ///< seed [standard deviations], low_sd..31
+    int halo_percent = 25;  ///< 0..90; 0 keeps the halo
+    int min_seeds = 5;      ///< seeds that a component needs [px], 1..10000
+    int max_runs = 65536;   ///< runs of the mask; more are dropped and counted
+  };
+
+  /// Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<ForegroundMask> create(const Config& config, int width, int height,
+                                                     Arena& arena) noexcept;
+
+  /// Fault: kBadSize, mask untouched. Returns the part of the picture that is foreground, 0..1.
+  [[nodiscard]] Result<double> run(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept;
+
+ private:
+  explicit ForegroundMask(const BlobExtractor& components) noexcept : components_(components) {}
+
+  int low_ = 0;
+  int high_ = 0;
+  Config config_;
+  ImageView<std::uint8_t> candidates_;
+  ImageView<std::uint8_t> row_max_;
+  BlobExtractor components_;
+  std::span<std::uint32_t> seeds_;
+};
+
+}  // namespace stereotrack

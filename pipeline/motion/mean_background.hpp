@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/result.hpp"
+
+namespace stereotrack {
+
+/// Still background as the mean of the first K pictures.
+///     g(x, y) = 1/K sum of g_i(x, y), i = 1..K                            (3.7)
+/// Until K pictures were seen the mean is over those seen, so that detection can start with the second.
+/// After K it is frozen. One instance a plane and thread. O(pixels) a picture while learning, then O(1).
+class MeanBackground {
+ public:
+  /// frames: K, 1..65535. Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<MeanBackground> create(int frames, int width, int height, Arena& arena) noexcept {
+    if (frames < 1 || frames > 65535) return fail(Fault::kBadConfig);
+    if (width < 1 || height < 1) return fail(Fault::kBadSize);
+    MeanBackground self;
+    self.frames_ = frames;
+    self.sum_ = arena.image<std::uint32_t>(width, height);
+    self.mean_ = arena.image<std::uint8_t>(width, height);
+    if (arena.failed()) return fail(Fault::kOutOfMemory);
+    return self;
+  }
+
+  /// Adds one picture of the size of create(). Beyond K pictures nothing happens.
+  void learn(ImageView<const std::uint8_t> picture) noexcept {
+    if (seen_ >= frames_) return;
+    ++seen_;
+    const auto n = static_cast<std::uint32_t>(seen_);
+    for (int y = 0; y < mean_.height; ++y) {
+      const std::uint8_t* in = picture.row(y);
+      std::uint32_t* sum = sum_.row(y);
+      std::uint8_t* mean = mean_.row(y);
+      for (int x = 0; x < mean_.width; ++x) {
+        sum[x] += in[x];
+        mean[x] = static_cast<std::uint8_t>((sum[x] + n / 2) / n);
+      }
+    }
+  }
+
+  /// The mean, rounded half up; all 0 before the first picture.
+  [[nodiscard]] ImageView<const std::uint8_t> mean() const noexcept { return mean_; }
+  [[nodiscard]] int seen() const noexcept { return seen_; }
+  [[nodiscard]] bool complete() const noexcept { return seen_ >= frames_; }
+
+ private:
+  int frames_ = 0;
+  int seen_ = 0;
+  ImageView<std::uint32_t> sum_;
+  ImageView<std::uint8_t> mean_;
+};
+
+}  // namespace stereotrack

@@ -1,0 +1,101 @@
+#include "pipeline/motion/shadow_test.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "pipeline/stereo/disparity.hpp"
+
+namespace stereotrack {
+
+namespace {
+
+constexpr int kReach = 2;
+
+template <class Fn>
+void for_each_neighbour(int x, int y, int width, int height, Fn&& fn) noexcept {
+  for (int v = std::max(y - kReach, 0); v <= std::min(y + kReach, height - 1); ++v) {
+    for (int u = std::max(x - kReach, 0); u <= std::min(x + kReach, width - 1); ++u) fn(u, v);
+  }
+}
+
+}  // namespace
+
+Result<ShadowTest> ShadowTest::create(const Config& config, int width, int height, Arena& arena) noexcept {
+  if (config.darkest_percent < 1 || config.darkest_percent > 99 || config.chroma_tolerance < 0 ||
+      config.texture_tolerance < 0 || !(config.disparity_px >= 0)) {
+    return fail(Fault::kBadConfig);
+  }
+  if (width < 1 || height < 1) return fail(Fault::kBadSize);
+  ShadowTest self;
+  self.config_ = config;
+  self.evidence_ = arena.image<std::uint8_t>(width, height);
+  if (arena.failed()) return fail(Fault::kOutOfMemory);
+  return self;
+}
+
+bool ShadowTest::looks_shadowed(const Input& in, int x, int y) const noexcept {
+  int now = 0;
+  int before = 0;
+  int count = 0;
+  for_each_neighbour(x, y, evidence_.width, evidence_.height, [&](int u, int v) {
+    now += in.y.at(u, v);
+    before += in.y_background.at(u, v);
+    ++count;
+  });
+  if (before == 0) return false;
+  const int ratio = static_cast<int>(static_cast<std::int64_t>(now) * 256 / before);
+  if (ratio * 100 < config_.darkest_percent * 256) return false;
+  int residual = 0;
+  for_each_neighbour(x, y, evidence_.width, evidence_.height, [&](int u, int v) {
+    residual += std::abs(in.y.at(u, v) * 256 - in.y_background.at(u, v) * ratio);
+  });
+  if (residual > (config_.texture_tolerance * 256) * count) return false;
+  if (in.cb.empty()) return true;
+  const auto chroma_kept = [&](int value, int background) {
+    return std::abs((value - 128) * 256 - (background - 128) * ratio) <= config_.chroma_tolerance * 256;
+  };
+  return chroma_kept(in.cb.at(x, y), in.cb_background.at(x, y)) &&
+         chroma_kept(in.cr.at(x, y), in.cr_background.at(x, y));
+}
+
+ShadowTest::Evidence ShadowTest::judge(const Input& in, int x, int y) const noexcept {
+  const bool darker = in.y.at(x, y) * 100 < in.y_background.at(x, y) * 95;
+  bool stereo_known = false;
+  bool stereo_same = false;
+  if (!in.disparity.empty()) {
+    const int now = in.disparity.at(x, y);
+    const int before = in.disparity_background.at(x, y);
+    stereo_known = now != kNoDisparity && before != kNoDisparity;
+    stereo_same = stereo_known && std::abs(now - before) <= static_cast<int>(config_.disparity_px * kDisparityScale);
+  }
+  if (stereo_known && !stereo_same) return kObject;
+  if (stereo_same) return looks_shadowed(in, x, y) ? kShadow : kObject;
+  return config_.photometric_alone && darker && looks_shadowed(in, x, y) ? kShadow : kObject;
+}
+
+std::uint32_t ShadowTest::run(const Input& in, ImageView<std::uint8_t> mask) noexcept {
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      evidence_.at(x, y) = mask.at(x, y) == 0 ? kOutside : judge(in, x, y);
+    }
+  }
+  std::uint32_t cleared = 0;
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      if (mask.at(x, y) == 0) continue;
+      int shadow = 0;
+      int object = 0;
+      for_each_neighbour(x, y, mask.width, mask.height, [&](int u, int v) {
+        shadow += evidence_.at(u, v) == kShadow ? 1 : 0;
+        object += evidence_.at(u, v) == kObject ? 1 : 0;
+      });
+      if (shadow > object) {
+        mask.at(x, y) = 0;
+        ++cleared;
+      }
+    }
+  }
+  return cleared;
+}
+
+}  // namespace stereotrack

@@ -1,0 +1,508 @@
+#include "pipeline/pipeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/motion/chroma_test.hpp"
+#include "pipeline/motion/difference.hpp"
+#include "pipeline/photometry/chroma.hpp"
+#include "pipeline/photometry/gray.hpp"
+#include "pipeline/photometry/smooth.hpp"
+#include "pipeline/shape/region.hpp"
+#include "pipeline/shape/threshold.hpp"
+
+namespace stereotrack {
+
+namespace {
+
+constexpr int kMaxRuns = 65536;
+// A blob of which the shadow test leaves less than this part was a shadow.
+constexpr int kShadowRestPercent = 25;
+// Room around a predicted disparity, in standard deviations and as a fraction, for targets that accelerate.
+constexpr double kRangeSd = 3;
+constexpr double kRangeFraction = 0.25;
+
+void fill(ImageView<std::uint8_t> picture, std::uint8_t value) noexcept {
+  for (int y = 0; y < picture.height; ++y) std::fill_n(picture.row(y), picture.width, value);
+}
+
+template <class T>
+void fill(ImageView<T> picture, const Rect& part, T value) noexcept {
+  for (int y = part.top; y < part.bottom(); ++y) std::fill_n(picture.row(y) + part.left, part.width, value);
+}
+
+// Takes what create() of a stage gave; remembers the first fault.
+template <class T>
+bool keep(std::optional<T>& stage, const Result<T>& made, Result<void>& outcome) noexcept {
+  if (!made.has_value()) {
+    outcome = fail(made.error());
+    return false;
+  }
+  stage.emplace(*made);
+  return true;
+}
+
+}  // namespace
+
+Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& setup, Arena& arena) noexcept {
+  if (setup.width < 16 || setup.height < 16 || setup.width > 8192 || setup.height > 8192) return fail(Fault::kBadSize);
+  Pipeline self(config, setup);
+  const auto planes = [&](Planes& view, bool colour) {
+    for (ImageView<std::uint8_t>* plane : {&view.y, &view.smooth_y, &view.distance, &view.mask}) {
+      *plane = arena.image<std::uint8_t>(setup.width, setup.height);
+    }
+    if (!colour) return;
+    for (ImageView<std::uint8_t>* plane : {&view.cb, &view.cr, &view.smooth_cb, &view.smooth_cr}) {
+      *plane = arena.image<std::uint8_t>(setup.width, setup.height);
+    }
+  };
+  planes(self.left_, setup.colour);
+  self.scratch_ = arena.image<std::uint8_t>(setup.width, setup.height);
+  self.moving_ = arena.image<std::uint8_t>(setup.width, setup.height);
+  self.equalise_left_ = Equalise({config.equalise});
+  self.equalise_right_ = Equalise({config.equalise});
+  if (const Result<void> made = self.create_foreground(arena); !made) return fail(made.error());
+  if (setup.calibration != nullptr) {
+    planes(self.right_, false);
+    if (const Result<void> made = self.create_stereo(arena); !made) return fail(made.error());
+  }
+  Result<void> outcome;
+  Tracker::View view{setup.width, setup.height, static_cast<double>(setup.width), 0};
+  if (self.rectifier_) {
+    view.focal = self.rectifier_->geometry().f;
+    view.focal_baseline = view.focal * self.rectifier_->geometry().baseline;
+  }
+  const bool all = keep(self.detector_, Detector::create(config.objects, setup.width, setup.height, arena), outcome) &&
+                   keep(self.tracker_, Tracker::create(config.track, view, arena), outcome);
+  if (!all) return fail(outcome.error());
+  if (arena.failed()) return fail(Fault::kOutOfMemory);
+  return self;
+}
+
+Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
+  const int width = setup_.width;
+  const int height = setup_.height;
+  const BackgroundConfig& background = config_.background;
+  const ShapeConfig& shape = config_.shape;
+  Result<void> outcome;
+  const bool edges = background.method == ForegroundMethod::kEdges;
+  if (edges) {
+    const auto mean = [&] { return MeanBackground::create(background.frames, width, height, arena); };
+    if (!keep(mean_y_, mean(), outcome)) return outcome;
+    if (setup_.colour && !(keep(mean_cb_, mean(), outcome) && keep(mean_cr_, mean(), outcome))) return outcome;
+    if (!keep(sobel_, Sobel::create({}, width, height, arena), outcome)) return outcome;
+  } else {
+    if (!keep(background_left_, AdaptiveBackground::create(background.adaptive, width, height, setup_.colour, arena),
+              outcome) ||
+        !keep(foreground_left_, ForegroundMask::create(config_.foreground, width, height, arena), outcome) ||
+        !keep(closing_, Closing::create({.repeats = shape.closing}, width, height, arena), outcome)) {
+      return outcome;
+    }
+  }
+  const std::int64_t hole = edges ? ContourFill::kUnlimited : shape.hole_px;
+  if (!keep(contour_fill_, ContourFill::create({.max_hole_px = hole}, width, height, arena), outcome) ||
+      !keep(opening_, Opening::create({.repeats = shape.opening}, width, height, arena), outcome) ||
+      !keep(blob_extractor_,
+            BlobExtractor::create({.max_runs = kMaxRuns, .max_blobs = shape.max_blobs, .min_area_px = shape.min_blob_px},
+                                  width, height, arena),
+            outcome) ||
+      !keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, arena), outcome)) {
+    return outcome;
+  }
+  if (shape.level_set) {
+    (void)(keep(level_set_, LevelSet::create(shape.level_set_config, width, height, arena), outcome) &&
+           keep(convex_hull_, ConvexHull::create({}, width, height, arena), outcome));
+  }
+  return outcome;
+}
+
+Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
+  const int width = setup_.width;
+  const int height = setup_.height;
+  Result<void> outcome;
+  if (!keep(rectifier_, Rectifier::create(*setup_.calibration, width, height, arena), outcome)) return outcome;
+  const RectifiedGeometry& canvas = rectifier_->geometry();
+  const DisparityConfig& disparity = config_.disparity;
+  full_range_ = std::max(static_cast<int>(disparity.reach * width + 0.5), disparity.max);
+  const DisparityRange dense{0, disparity.max};
+  if (disparity.method == MatchMethod::kSad) {
+    if (!keep(sad_,
+              SadMatcher::create({.width = canvas.width_left, .height = canvas.height, .right_width = canvas.width_right,
+                                  .offset = canvas.offset, .block = disparity.block, .range = dense,
+                                  .region_disparities = full_range_ + 1},
+                                 arena),
+              outcome)) {
+      return outcome;
+    }
+  } else if (!keep(census_,
+                   CensusMatcher::create({.width = canvas.width_left, .height = canvas.height,
+                                          .right_width = canvas.width_right, .offset = canvas.offset,
+                                          .block = disparity.block, .range = dense,
+                                          .region_disparities = full_range_ + 1, .filter = {.fill_px = 0}},
+                                         arena),
+                   outcome)) {
+    return outcome;
+  }
+  if (!keep(region_matcher_,
+            RegionMatcher::create({.width = canvas.width_left, .height = canvas.height,
+                                   .right_width = canvas.width_right, .offset = canvas.offset,
+                                   .disparities = full_range_ + 1},
+                                  arena),
+            outcome)) {
+    return outcome;
+  }
+  if (config_.background.method == ForegroundMethod::kAdaptive) {
+    if (!keep(background_right_,
+              AdaptiveBackground::create(config_.background.adaptive, width, height, false, arena), outcome) ||
+        !keep(foreground_right_, ForegroundMask::create(config_.foreground, width, height, arena), outcome)) {
+      return outcome;
+    }
+    left_.background_canvas = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
+    right_.background_canvas = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
+    right_moving_ = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
+    canvas_background_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
+    canvas_known_ = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
+    old_disparity_ = arena.image<std::uint16_t>(width, height);
+  }
+  left_.canvas = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
+  right_.canvas = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
+  wanted_ = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
+  canvas_labels_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
+  canvas_disparity_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
+  disparity_ = arena.image<std::uint16_t>(width, height);
+  return outcome;
+}
+
+Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
+  const bool stereo = rectifier_.has_value();
+  const auto fits = [&](const Picture& picture) { return picture.width == setup_.width && picture.height == setup_.height; };
+  if (!fits(pair.left) || (stereo && !fits(pair.right))) return fail(Fault::kBadSize);
+  if (setup_.colour && pair.left.format != PixelFormat::kBgr8) return fail(Fault::kBadFormat);
+  const double dt = started_ ? std::max(seconds_between(last_time_, pair.capture_time), 0.0) : 0.0;
+  last_time_ = pair.capture_time;
+  started_ = true;
+  rejections_ = {};
+
+  ingest(pair);  // gray 3.1, equalisation 3.2-3.5, chroma 3.17-3.19
+  ended(Stage::kIngest);
+  predictions_ = tracker_->predict(dt);  // 3.24, 3.26, 3.27: bounds the searches below
+  find_foreground();                     // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
+  ended(Stage::kForeground);             // contours, opening 3.13-3.15, blobs
+  refine_blobs();                        // convex hull 3.16, level set
+  if (stereo) find_disparity();          // block matching 3.6, where something moves
+  ended(Stage::kDisparity);
+  remove_shadows();  // sigma test 3.20-3.23, or stereo first
+  ended(Stage::kShadow);
+  const Detector::Input objects{.blobs = blobs_.blobs,
+                                .labels = blobs_.labels,
+                                .disparity = disparity_,
+                                .y = left_.y,
+                                .cb = left_.cb,
+                                .cr = left_.cr,
+                                .strength = left_.distance,
+                                .predictions = predictions_,
+                                .rectifier = rectifier()};
+  for (Detector::Candidate& candidate : detector_->segment(objects)) match_small(candidate, objects);
+  const std::span<const Detection> detections = detector_->conclude(objects);
+  ended(Stage::kObjects);
+  tracker_->update(detections);  // 3.25, 3.28-3.32
+  ended(Stage::kTracking);
+  learn_background();
+  ended(Stage::kBackground);
+
+  for (int y = 0; y < setup_.height; ++y) {
+    const std::uint16_t* label = blobs_.labels.row(y);
+    std::uint8_t* mask = left_.mask.row(y);
+    for (int x = 0; x < setup_.width; ++x) mask[x] = label[x] != 0 ? 255 : 0;
+  }
+  FrameResult result;
+  result.ordinal = pair.ordinal;
+  result.capture_time = pair.capture_time;
+  result.flags = (stereo ? 0U : kFlagMono) | (setup_.colour ? 0U : kFlagNoColour) |
+                 (frames_ <= config_.background.frames ? kFlagLearning : 0U) | (light_change_ ? kFlagLightChange : 0U);
+  result.tracks = tracker_->reports();
+  result.mask = left_.mask;
+  result.labels = blobs_.labels;
+  result.detections = detections;
+  for (std::size_t i = 0; i < kRejections; ++i) result.rejections[i] = rejections_[i] + detector_->rejections()[i];
+  return result;
+}
+
+void Pipeline::ingest(const FramePair& pair) noexcept {
+  gray(pair.left, left_.y);
+  if (setup_.colour) chroma(pair.left, left_.y, left_.cb, left_.cr);
+  equalise_left_.run(left_.y);
+  smooth3x3(left_.y, left_.smooth_y);
+  if (setup_.colour) {
+    smooth3x3(left_.cb, left_.smooth_cb);
+    smooth3x3(left_.cr, left_.smooth_cr);
+  }
+  if (!rectifier_) return;
+  gray(pair.right, right_.y);
+  equalise_right_.run(right_.y);
+  smooth3x3(right_.y, right_.smooth_y);
+  rectifier_->rectify(left_.y, View::kLeft, left_.canvas);
+  rectifier_->rectify(right_.y, View::kRight, right_.canvas);
+}
+
+AdaptiveBackground::Planes Pipeline::left_planes() const noexcept {
+  return {left_.smooth_y, left_.smooth_cb, left_.smooth_cr};
+}
+
+void Pipeline::find_foreground() noexcept {
+  if (config_.background.method == ForegroundMethod::kEdges) {
+    foreground_from_edges();
+  } else {
+    foreground_from_model();
+  }
+  if (const auto blobs = blob_extractor_->run(left_.mask); blobs.has_value()) blobs_ = *blobs;
+  rejections_[static_cast<std::size_t>(Rejection::kSmall)] += static_cast<std::uint32_t>(blobs_.small);
+  rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] += static_cast<std::uint32_t>(blobs_.dropped_blobs);
+}
+
+void Pipeline::foreground_from_edges() noexcept {
+  ++frames_;
+  mean_y_->learn(left_.y);
+  if (setup_.colour) {
+    mean_cb_->learn(left_.cb);
+    mean_cr_->learn(left_.cr);
+  }
+  difference(mean_y_->mean(), left_.y, left_.distance);
+  (void)sobel_->run(left_.distance, scratch_);
+  (void)threshold(scratch_, config_.shape.edge_threshold, scratch_);
+  (void)contour_fill_->run(scratch_, scratch_);
+  (void)opening_->run(scratch_, left_.mask);
+}
+
+void Pipeline::foreground_from_model() noexcept {
+  background_left_->distance(left_planes(), left_.distance);
+  const Result<double> part = foreground_left_->run(left_.distance, left_.mask);
+  light_change_ = part.has_value() && *part * 100 > config_.background.adaptive.relearn_percent;
+  if (light_change_) fill(left_.mask, 0);
+  for (int y = 0; y < setup_.height; ++y) std::copy_n(left_.mask.row(y), setup_.width, moving_.row(y));
+  (void)closing_->run(left_.mask, scratch_);
+  (void)contour_fill_->run(scratch_, left_.mask);
+  ++frames_;
+  if (!rectifier_) return;
+  background_right_->distance({right_.smooth_y, {}, {}}, right_.distance);
+  (void)foreground_right_->run(right_.distance, right_.mask);
+  const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kRight);
+  for (int v = 0; v < right_moving_.height; ++v) {
+    for (int u = 0; u < right_moving_.width; ++u) {
+      const Rectifier::Point16 p = raw.at(u, v);
+      right_moving_.at(u, v) = p.valid() ? right_.mask.at(p.x, p.y) : std::uint8_t{0};
+    }
+  }
+  rectifier_->rectify(background_left_->luma(), View::kLeft, left_.background_canvas);
+  rectifier_->rectify(background_right_->luma(), View::kRight, right_.background_canvas);
+}
+
+void Pipeline::refine_blobs() noexcept {
+  if (!level_set_) return;
+  for (Blob& blob : blobs_.blobs) {
+    const Result<Hull> hull = convex_hull_->run(blobs_.labels, blob.box, blob.label);
+    if (!hull.has_value()) continue;
+    hull_claim(*hull, blobs_.labels, blob.label);
+    const auto outcome = level_set_->run(left_.distance, blobs_.labels, blob.box, blob.label);
+    if (outcome.has_value()) blob = outcome->blob;
+  }
+}
+
+DisparityRange Pipeline::range_for(const Blob& blob) const noexcept {
+  double low = full_range_;
+  double high = 0;
+  std::int64_t explained = 0;
+  for (const Prediction& target : predictions_) {
+    if (!target.confirmed || !target.has_depth) continue;
+    const int slack = static_cast<int>(3 * target.image_sd + 2);
+    const Rect reach{target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack,
+                     target.box.height + 2 * slack};
+    const Rect common = intersect(reach, blob.box);
+    if (common.empty()) continue;
+    explained = std::max(explained, common.area());
+    const double room = kRangeSd * target.disparity_sd + kRangeFraction * target.disparity + 3;
+    low = std::min(low, target.disparity - room);
+    high = std::max(high, target.disparity + room);
+  }
+  // What no target explains may be anything: then the nearest distance admitted bounds the search.
+  if (explained * 10 < blob.box.area() * 9) return {0, full_range_};
+  return {std::max(static_cast<int>(low), 0), std::min(static_cast<int>(high) + 1, full_range_)};
+}
+
+Rect Pipeline::paint_on_canvas(const Rect& box, std::uint16_t label) noexcept {
+  const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
+  double left = 1e9;
+  double top = 1e9;
+  double right = -1e9;
+  double bottom = -1e9;
+  const auto reach = [&](int x, int y) {
+    const Rectifier::PointF p = place.at(x, y);
+    if (!p.valid()) return;
+    left = std::min<double>(left, p.x);
+    right = std::max<double>(right, p.x);
+    top = std::min<double>(top, p.y);
+    bottom = std::max<double>(bottom, p.y);
+  };
+  for (int x = box.left; x < box.right(); ++x) {
+    reach(x, box.top);
+    reach(x, box.bottom() - 1);
+  }
+  for (int y = box.top; y < box.bottom(); ++y) {
+    reach(box.left, y);
+    reach(box.right() - 1, y);
+  }
+  if (right < left) return {};
+  const int u = static_cast<int>(std::floor(left)) - 1;
+  const int v = static_cast<int>(std::floor(top)) - 1;
+  const Rect roi = intersect({u, v, static_cast<int>(std::ceil(right)) + 2 - u, static_cast<int>(std::ceil(bottom)) + 2 - v},
+                             {0, 0, wanted_.width, wanted_.height});
+  const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
+  for (int y = roi.top; y < roi.bottom(); ++y) {
+    for (int x = roi.left; x < roi.right(); ++x) {
+      const Rectifier::Point16 p = raw.at(x, y);
+      const bool inside = p.valid() && blobs_.labels.at(p.x, p.y) == label;
+      wanted_.at(x, y) = inside ? 255 : 0;
+      canvas_labels_.at(x, y) = inside ? 1 : 0;
+    }
+  }
+  return roi;
+}
+
+void Pipeline::run_matcher(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, const Rect& roi,
+                           DisparityRange range, ImageView<std::uint16_t> out) noexcept {
+  if (sad_) {
+    (void)sad_->run_region(left, right, roi, wanted_, range, out);
+  } else {
+    (void)census_->run_region(left, right, roi, wanted_, range, out);
+  }
+}
+
+void Pipeline::match_background(const Blob& blob, const Rect& roi) noexcept {
+  const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
+  // The background hardly changes: each place is matched once, when something first hides it.
+  for (int y = roi.top; y < roi.bottom(); ++y) {
+    for (int x = roi.left; x < roi.right(); ++x) {
+      if (canvas_known_.at(x, y) != 0) wanted_.at(x, y) = 0;
+    }
+  }
+  run_matcher(left_.background_canvas, right_.background_canvas, roi, {0, full_range_}, canvas_background_);
+  for (int y = roi.top; y < roi.bottom(); ++y) {
+    for (int x = roi.left; x < roi.right(); ++x) {
+      if (wanted_.at(x, y) != 0) canvas_known_.at(x, y) = 1;
+    }
+  }
+  for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
+    const Rectifier::PointF p = place.at(x, y);
+    const int u = static_cast<int>(std::floor(p.x + 0.5F));
+    const int v = static_cast<int>(std::floor(p.y + 0.5F));
+    const bool known = p.valid() && canvas_known_.contains(u, v) && canvas_known_.at(u, v) != 0;
+    old_disparity_.at(x, y) = known ? canvas_background_.at(u, v) : kNoDisparity;
+  });
+}
+
+void Pipeline::match_blob(const Blob& blob) noexcept {
+  const Rect roi = paint_on_canvas(blob.box, blob.label);
+  if (roi.empty()) return;
+  if (config_.disparity.mode == DisparityMode::kRegions) {
+    fill(canvas_disparity_, roi, kNoDisparity);
+    run_matcher(left_.canvas, right_.canvas, roi, range_for(blob), canvas_disparity_);
+  }
+  const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
+  for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
+    const Rectifier::PointF p = place.at(x, y);
+    const int u = static_cast<int>(std::floor(p.x + 0.5F));
+    const int v = static_cast<int>(std::floor(p.y + 0.5F));
+    const bool known = p.valid() && canvas_disparity_.contains(u, v);
+    disparity_.at(x, y) = known ? canvas_disparity_.at(u, v) : kNoDisparity;
+  });
+  if (config_.shadow.method == ShadowMethod::kStereo && background_right_) match_background(blob, roi);
+}
+
+void Pipeline::match_dense() noexcept {
+  if (sad_) {
+    (void)sad_->run(left_.canvas, right_.canvas, canvas_disparity_);
+  } else {
+    (void)census_->run(left_.canvas, right_.canvas, canvas_disparity_);
+  }
+}
+
+void Pipeline::find_disparity() noexcept {
+  if (config_.disparity.mode == DisparityMode::kDense) match_dense();
+  for (const Blob& blob : blobs_.blobs) {
+    if (blob.area > 0) match_blob(blob);
+  }
+}
+
+void Pipeline::remove_shadows() noexcept {
+  for (int y = 0; y < setup_.height; ++y) {
+    const std::uint16_t* label = blobs_.labels.row(y);
+    std::uint8_t* mask = left_.mask.row(y);
+    for (int x = 0; x < setup_.width; ++x) mask[x] = label[x] != 0 ? 255 : 0;
+  }
+  std::uint32_t cleared = 0;
+  if (config_.shadow.method == ShadowMethod::kChroma) {
+    if (!setup_.colour) return;
+    cleared = mean_cb_ ? ChromaTest::run(left_.cb, left_.cr, mean_cb_->mean(), mean_cr_->mean(), left_.mask)
+                       : ChromaTest::run(left_.smooth_cb, left_.smooth_cr, background_left_->blue(),
+                                         background_left_->red(), left_.mask);
+  } else if (config_.shadow.method == ShadowMethod::kStereo && background_left_) {
+    cleared = shadow_test_->run({.y = left_.smooth_y,
+                                 .cb = left_.smooth_cb,
+                                 .cr = left_.smooth_cr,
+                                 .y_background = background_left_->luma(),
+                                 .cb_background = background_left_->blue(),
+                                 .cr_background = background_left_->red(),
+                                 .disparity = disparity_,
+                                 .disparity_background = old_disparity_},
+                                left_.mask);
+  }
+  if (cleared == 0) return;
+  for (const Blob& blob : blobs_.blobs) {
+    std::int32_t rest = 0;
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { rest += left_.mask.at(x, y) != 0 ? 1 : 0; });
+    if (rest * 100 >= blob.area * kShadowRestPercent) continue;
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { left_.mask.at(x, y) = 0; });
+    ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];
+  }
+  (void)opening_->run(left_.mask, scratch_);
+  if (const auto blobs = blob_extractor_->run(scratch_); blobs.has_value()) blobs_ = *blobs;
+}
+
+void Pipeline::match_small(Detector::Candidate& candidate, const Detector::Input& in) noexcept {
+  if (!region_matcher_) return;
+  const bool sparse = !candidate.has_depth || candidate.valid * 4 < candidate.area;
+  if (!sparse && candidate.area > config_.disparity.small_px) return;
+  const Rect roi = paint_on_canvas(candidate.box, candidate.label);
+  if (roi.empty()) return;
+  DisparityRange range{0, full_range_};
+  if (candidate.claim >= 0) {
+    const Prediction& target = in.predictions[static_cast<std::size_t>(candidate.claim)];
+    if (target.has_depth) {
+      const double room = kRangeSd * target.disparity_sd + kRangeFraction * target.disparity + 3;
+      range.min = std::clamp(static_cast<int>(target.disparity - room), 0, full_range_);
+      range.max = std::clamp(static_cast<int>(target.disparity + room) + 1, range.min, full_range_);
+    }
+  }
+  const auto match = region_matcher_->run<std::uint16_t>(left_.canvas, right_.canvas, canvas_labels_, 1, roi, range,
+                                                         right_moving_);
+  if (!match.has_value() || !match->found) return;
+  const bool convincing = match->uniqueness >= 1.2 && (right_moving_.empty() || match->foreground_share >= 0.5);
+  if (!convincing) return;
+  candidate.has_depth = true;
+  candidate.disparity = match->disparity_px;
+  candidate.disparity_sd = match->sigma_px;
+  candidate.scatter = 0.5;
+}
+
+void Pipeline::learn_background() noexcept {
+  if (!background_left_) return;
+  if (light_change_) {
+    background_left_->restart();
+    if (background_right_) background_right_->restart();
+    if (rectifier_) fill(canvas_known_, 0);
+  }
+  background_left_->learn(left_planes(), moving_);
+  if (background_right_) background_right_->learn({right_.smooth_y, {}, {}}, right_.mask);
+}
+
+}  // namespace stereotrack

@@ -1,0 +1,172 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/result.hpp"
+#include "pipeline/frame.hpp"
+#include "pipeline/geometry/rectify.hpp"
+#include "pipeline/motion/mean_background.hpp"
+#include "pipeline/pipeline_config.hpp"
+#include "pipeline/shape/contour_fill.hpp"
+#include "pipeline/shape/morphology.hpp"
+#include "pipeline/shape/sobel.hpp"
+#include "pipeline/stereo/region_matcher.hpp"
+#include "pipeline/stereo/sad_matcher.hpp"
+#include "pipeline/track/track_report.hpp"
+
+namespace stereotrack {
+
+/// The stages as they are timed and shed: each ends where the next begins.
+enum class Stage : std::uint8_t { kIngest, kForeground, kDisparity, kShadow, kObjects, kTracking, kBackground };
+inline constexpr std::size_t kStages = 7;
+[[nodiscard]] constexpr const char* to_string(Stage stage) noexcept {
+  constexpr std::array<const char*, kStages> kNames{"ingest", "foreground", "disparity", "shadow",
+                                                    "objects", "tracking", "background"};
+  return kNames[static_cast<std::size_t>(stage)];
+}
+
+/// Told when a stage has ended. The pipeline has no clock; who times it, brings one.
+struct StageObserver {
+  void (*ended)(void* context, Stage stage) noexcept = nullptr;
+  void* context = nullptr;
+};
+
+/// What is true of a frame beside its targets. Bits.
+enum FrameFlag : std::uint32_t {
+  kFlagMono = 1,         ///< no second view: 2-D tracks only
+  kFlagNoColour = 2,     ///< grey source: the chroma tests did not run
+  kFlagLearning = 4,     ///< fewer than background.frames frames seen so far
+  kFlagLightChange = 8,  ///< so much changed at once that the background starts anew
+};
+
+/// What one pair gave. Views live until the pipeline's next run.
+struct FrameResult {
+  std::uint64_t ordinal = 0;
+  CaptureTime capture_time{};
+  std::uint32_t flags = 0;                 ///< FrameFlag bits
+  std::span<const TrackReport> tracks;     ///< in the order of their ids
+  ImageView<const std::uint8_t> mask;      ///< final object mask, raw left picture, 0 or 255
+  ImageView<const std::uint16_t> labels;   ///< detection of each pixel, 0 = none
+  std::span<const Detection> detections;
+  RejectionCounts rejections{};            ///< candidates rejected, by Rejection
+};
+
+/// The whole algorithm: pairs in, targets out. A function of its state, the pixels and the capture times.
+/// The order of the stages is that of the document; run() reads like its table of contents.
+/// One thread. No allocation, no lock, no I/O after create().
+class Pipeline {
+ public:
+  struct Setup {
+    int width = 0;        ///< of one raw picture [px]
+    int height = 0;       ///< [px]
+    bool colour = false;  ///< the source gives kBgr8
+    const StereoCalibration* calibration = nullptr;  ///< null: mono
+    StageObserver observer;
+  };
+
+  /// Faults: those of the stages. The arena must outlive the pipeline.
+  [[nodiscard]] static Result<Pipeline> create(const PipelineConfig& config, const Setup& setup,
+                                               Arena& arena) noexcept;
+
+  /// Faults, state untouched: kBadSize, kBadFormat.
+  [[nodiscard]] Result<FrameResult> run(const FramePair& pair) noexcept;
+
+  /// Null for mono.
+  [[nodiscard]] const Rectifier* rectifier() const noexcept { return rectifier_ ? &*rectifier_ : nullptr; }
+
+ private:
+  /// One view's planes, raw size.
+  struct Planes {
+    ImageView<std::uint8_t> y;
+    ImageView<std::uint8_t> smooth_y;
+    ImageView<std::uint8_t> cb;
+    ImageView<std::uint8_t> cr;
+    ImageView<std::uint8_t> smooth_cb;
+    ImageView<std::uint8_t> smooth_cr;
+    ImageView<std::uint8_t> distance;
+    ImageView<std::uint8_t> mask;
+    ImageView<std::uint8_t> canvas;             ///< luma, rectified
+    ImageView<std::uint8_t> background_canvas;  ///< background's luma, rectified
+  };
+
+  explicit Pipeline(const PipelineConfig& config, const Setup& setup) noexcept : config_(config), setup_(setup) {}
+
+  [[nodiscard]] Result<void> create_foreground(Arena& arena) noexcept;
+  [[nodiscard]] Result<void> create_stereo(Arena& arena) noexcept;
+  void ended(Stage stage) const noexcept {
+    if (setup_.observer.ended != nullptr) setup_.observer.ended(setup_.observer.context, stage);
+  }
+
+  void ingest(const FramePair& pair) noexcept;
+  void find_foreground() noexcept;
+  void foreground_from_edges() noexcept;
+  void foreground_from_model() noexcept;
+  void find_disparity() noexcept;
+  void match_dense() noexcept;
+  void match_blob(const Blob& blob) noexcept;
+  void match_background(const Blob& blob, const Rect& roi) noexcept;
+  void remove_shadows() noexcept;
+  void refine_blobs() noexcept;
+  void match_small(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
+  void learn_background() noexcept;
+  [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
+  [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;
+  [[nodiscard]] Rect paint_on_canvas(const Rect& box, std::uint16_t label) noexcept;
+  void run_matcher(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, const Rect& roi,
+                   DisparityRange range, ImageView<std::uint16_t> out) noexcept;
+
+  PipelineConfig config_;
+  Setup setup_;
+  bool started_ = false;
+  bool light_change_ = false;
+  int frames_ = 0;
+  int full_range_ = 0;
+  CaptureTime last_time_{};
+  std::span<const Prediction> predictions_;
+  BlobSet blobs_;
+  RejectionCounts rejections_{};
+
+  Planes left_;
+  Planes right_;
+  ImageView<std::uint8_t> scratch_;
+  ImageView<std::uint8_t> moving_;            ///< foreground before shadows are removed
+  ImageView<std::uint16_t> disparity_;        ///< raw left picture [1/16 px]
+  ImageView<std::uint16_t> old_disparity_;    ///< the background's, raw left picture
+  ImageView<std::uint8_t> wanted_;            ///< canvas: pixels to be matched
+  ImageView<std::uint16_t> canvas_labels_;
+  ImageView<std::uint16_t> canvas_disparity_;
+  ImageView<std::uint16_t> canvas_background_;  ///< background's disparity, filled as it is needed
+  ImageView<std::uint8_t> canvas_known_;        ///< where canvas_background_ has been computed
+  ImageView<std::uint8_t> right_moving_;        ///< right canvas: foreground of the right view
+
+  Equalise equalise_left_{{}};
+  Equalise equalise_right_{{}};
+  std::optional<MeanBackground> mean_y_;
+  std::optional<MeanBackground> mean_cb_;
+  std::optional<MeanBackground> mean_cr_;
+  std::optional<AdaptiveBackground> background_left_;
+  std::optional<AdaptiveBackground> background_right_;
+  std::optional<ForegroundMask> foreground_left_;
+  std::optional<ForegroundMask> foreground_right_;
+  std::optional<Sobel> sobel_;
+  std::optional<ContourFill> contour_fill_;
+  std::optional<Opening> opening_;
+  std::optional<Closing> closing_;
+  std::optional<BlobExtractor> blob_extractor_;
+  std::optional<ConvexHull> convex_hull_;
+  std::optional<LevelSet> level_set_;
+  std::optional<ShadowTest> shadow_test_;
+  std::optional<Rectifier> rectifier_;
+  std::optional<SadMatcher> sad_;
+  std::optional<CensusMatcher> census_;
+  std::optional<RegionMatcher> region_matcher_;
+  std::optional<Detector> detector_;
+  std::optional<Tracker> tracker_;
+};
+
+}  // namespace stereotrack

@@ -1,0 +1,184 @@
+#include "pipeline/shape/level_set.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "pipeline/shape/region.hpp"
+
+namespace stereotrack {
+namespace {
+
+constexpr std::int8_t kIn = 1;
+constexpr std::int8_t kOut = -1;
+constexpr std::int8_t kNone = 0;
+
+// The disc of 37 pixels within sqrt(10) px: half widths of its rows. A straight contour along a row parts
+// 15 + 8 + 3 = 26 pairs a pixel.
+constexpr int kReach = 3;
+constexpr std::array<int, 2 * kReach + 1> kHalfWidth = {1, 2, 3, 3, 3, 2, 1};
+constexpr int kPairsPerPixel = 26;
+
+}  // namespace
+
+Result<LevelSet> LevelSet::create(const Config& config, int width, int height, Arena& arena) noexcept {
+  if (width <= 0 || height <= 0 || config.margin_px < 0 || config.margin_px > 1000 || config.max_iterations < 0 ||
+      config.contour_weight < 0 || config.contour_weight > 65025 || config.feature_cap < 1 ||
+      config.feature_cap > 255) {
+    return fail(Fault::kBadConfig);
+  }
+  LevelSet stage;
+  stage.config_ = config;
+  stage.width_ = width;
+  stage.height_ = height;
+  const std::size_t framed =
+      (static_cast<std::size_t>(width) + 2 * kReach) * (static_cast<std::size_t>(height) + 2 * kReach);
+  stage.side_ = arena.array<std::int8_t>(framed);
+  stage.feature_ = arena.array<std::uint8_t>(framed);
+  stage.queued_ = arena.array<std::uint8_t>(framed);
+  stage.band_ = arena.array<std::int32_t>(framed);
+  stage.next_band_ = arena.array<std::int32_t>(framed);
+  if (stage.side_.empty() || stage.feature_.empty() || stage.queued_.empty() || stage.band_.empty() ||
+      stage.next_band_.empty()) {
+    return fail(Fault::kOutOfMemory);
+  }
+  return stage;
+}
+
+Result<LevelSet::Outcome> LevelSet::run(ImageView<const std::uint8_t> feature, ImageView<std::uint16_t> labels,
+                                        const Rect& box, std::uint16_t label) noexcept {
+  if (feature.width != width_ || feature.height != height_ || !feature.same_size(labels)) {
+    return fail(Fault::kBadSize);
+  }
+  if (label == 0) return fail(Fault::kBadConfig);
+  Outcome outcome;
+  outcome.blob.label = label;
+  const Rect picture{0, 0, width_, height_};
+  const Rect start = intersect(box, picture);
+  if (start.empty()) {
+    outcome.converged = true;
+    return outcome;
+  }
+  const int margin = config_.margin_px;
+  domain_ = intersect({start.left - margin, start.top - margin, start.width + 2 * margin, start.height + 2 * margin},
+                      picture);
+  load(feature, labels, label);
+  const std::int64_t data_start = in_.energy() + out_.energy();
+  while (!outcome.converged && outcome.iterations < config_.max_iterations) {
+    outcome.converged = sweep() == 0;
+    ++outcome.iterations;
+    in_.renew_mean();
+    out_.renew_mean();
+  }
+  outcome.energy_drop = data_start - in_.energy() - out_.energy() - pair_weight() * parted_;
+  outcome.mean_in = static_cast<int>(in_.mean);
+  outcome.mean_out = static_cast<int>(out_.mean);
+
+  for (int y = 0; y < domain_.height; ++y) {
+    const std::int8_t* side = &side_[at(0, y)];
+    std::uint16_t* row = labels.row(domain_.top + y) + domain_.left;
+    for (int x = 0; x < domain_.width; ++x) {
+      if (side[x] != kNone) row[x] = side[x] == kIn ? label : 0;
+    }
+  }
+  outcome.blob = measure_region(labels, domain_, label);
+  return outcome;
+}
+
+void LevelSet::load(ImageView<const std::uint8_t> feature, ImageView<const std::uint16_t> labels,
+                    std::uint16_t label) noexcept {
+  stride_ = domain_.width + 2 * kReach;
+  const std::int32_t framed = stride_ * (domain_.height + 2 * kReach);
+  std::fill_n(side_.begin(), framed, kNone);
+  std::fill_n(queued_.begin(), framed, std::uint8_t{0});
+  in_ = {};
+  out_ = {};
+  parted_ = 0;
+  next_size_ = 0;
+  for (int y = 0; y < domain_.height; ++y) {
+    const std::uint16_t* row = labels.row(domain_.top + y) + domain_.left;
+    const std::uint8_t* from = feature.row(domain_.top + y) + domain_.left;
+    std::int8_t* side = &side_[at(0, y)];
+    std::uint8_t* values = &feature_[at(0, y)];
+    for (int x = 0; x < domain_.width; ++x)
+      values[x] = std::min(from[x], static_cast<std::uint8_t>(config_.feature_cap));
+    for (int x = 0; x < domain_.width; ++x) {
+      if (row[x] == label) {
+        side[x] = kIn;
+        in_.add(values[x], 1);
+      } else if (row[x] == 0) {
+        side[x] = kOut;
+        out_.add(values[x], 1);
+      }
+    }
+  }
+  in_.renew_mean();
+  out_.renew_mean();
+  for (int y = 0; y < domain_.height; ++y) {
+    for (int x = 0; x < domain_.width; ++x) {
+      if (on_contour(at(x, y))) queue(at(x, y));
+    }
+  }
+}
+
+int LevelSet::sweep() noexcept {
+  std::swap(band_, next_band_);
+  const std::int32_t band_size = next_size_;
+  next_size_ = 0;
+  for (std::int32_t i = 0; i < band_size; ++i) queued_[band_[i]] = 0;
+
+  // (I - c_out)^2 - (I - c_in)^2: what belonging inside is worth.
+  std::array<std::int64_t, 256> worth;
+  const std::int64_t span = out_.mean - in_.mean;
+  const std::int64_t sum = out_.mean + in_.mean;
+  for (int value = 0; value < 256; ++value) worth[value] = span * (sum - 512 * value);
+
+  int changed = 0;
+  for (std::int32_t i = 0; i < band_size; ++i) {
+    const std::int32_t p = band_[i];
+    if (!on_contour(p)) continue;
+    queue(p);
+    const std::int8_t side = side_[p];
+    const std::uint8_t value = feature_[p];
+    const int parted = side * balance(p);  // neighbours on its side are parted from it, those on the other joined
+    if (side * worth[value] + pair_weight() * parted >= 0) continue;
+    in_.add(value, -side);
+    out_.add(value, side);
+    parted_ += parted;
+    side_[p] = static_cast<std::int8_t>(-side);
+    ++changed;
+    for (const std::int32_t neighbour : {p - stride_, p - 1, p + 1, p + stride_}) queue(neighbour);
+  }
+  return changed;
+}
+
+/// Neighbours inside less neighbours outside.
+int LevelSet::balance(std::int32_t p) const noexcept {
+  int sum = -side_[p];
+  const std::int8_t* row = &side_[p] - kReach * stride_;
+  for (const int half : kHalfWidth) {
+    for (int x = -half; x <= half; ++x) sum += row[x];
+    row += stride_;
+  }
+  return sum;
+}
+
+bool LevelSet::on_contour(std::int32_t p) const noexcept {
+  const int other = -side_[p];
+  return other != kNone &&
+         (side_[p - 1] == other || side_[p + 1] == other || side_[p - stride_] == other || side_[p + stride_] == other);
+}
+
+void LevelSet::queue(std::int32_t p) noexcept {
+  if (side_[p] == kNone || queued_[p] != 0) return;
+  queued_[p] = 1;
+  next_band_[next_size_++] = p;
+}
+
+std::int64_t LevelSet::pair_weight() const noexcept {
+  return static_cast<std::int64_t>(config_.contour_weight) * 65536 / kPairsPerPixel;
+}
+
+std::int32_t LevelSet::at(int x, int y) const noexcept { return (y + kReach) * stride_ + x + kReach; }
+
+}  // namespace stereotrack

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/rect.hpp"
+#include "pipeline/shape/blob_extractor.hpp"
+
+// Small tools on a region: the pixels of `labels` inside `box` whose value is `label`. The box is clipped
+// to the picture. No state.
+namespace stereotrack {
+
+/// BorderSide bits of the picture's sides that `box` touches.
+[[nodiscard]] inline std::uint8_t sides_touched(const Rect& box, int width, int height) noexcept {
+  if (box.empty()) return 0;
+  return static_cast<std::uint8_t>((box.left <= 0 ? kLeftSide : 0) | (box.top <= 0 ? kTopSide : 0) |
+                                   (box.right() >= width ? kRightSide : 0) |
+                                   (box.bottom() >= height ? kBottomSide : 0));
+}
+
+/// Calls fn(x, y) for each pixel of the region, in raster order. O(box).
+template <class Fn>
+void for_each_pixel(ImageView<const std::uint16_t> labels, const Rect& box, std::uint16_t label, Fn&& fn) noexcept {
+  const Rect part = intersect(box, {0, 0, labels.width, labels.height});
+  for (int y = part.top; y < part.bottom(); ++y) {
+    const std::uint16_t* row = labels.row(y);
+    for (int x = part.left; x < part.right(); ++x) {
+      if (row[x] == label) fn(x, y);
+    }
+  }
+}
+
+/// Calls fn(x, y) for each pixel of the region with a 4-neighbour that has another label, in raster order:
+/// the inner boundary. The end of the picture is not a boundary: there the object goes on unseen. O(box).
+template <class Fn>
+void for_each_boundary_pixel(ImageView<const std::uint16_t> labels, const Rect& box, std::uint16_t label,
+                             Fn&& fn) noexcept {
+  const int last_x = labels.width - 1;
+  const int last_y = labels.height - 1;
+  for_each_pixel(labels, box, label, [&](int x, int y) noexcept {
+    const bool boundary = (x > 0 && labels.at(x - 1, y) != label) || (x < last_x && labels.at(x + 1, y) != label) ||
+                          (y > 0 && labels.at(x, y - 1) != label) || (y < last_y && labels.at(x, y + 1) != label);
+    if (boundary) fn(x, y);
+  });
+}
+
+/// The region's Blob, measured anew (after labels were merged, split or refined). Area 0 and an empty box
+/// where there is no such pixel. O(box).
+[[nodiscard]] inline Blob measure_region(ImageView<const std::uint16_t> labels, const Rect& box,
+                                         std::uint16_t label) noexcept {
+  Blob blob;
+  blob.label = label;
+  std::int64_t sum_x = 0;
+  std::int64_t sum_y = 0;
+  Rect tight;
+  for_each_pixel(labels, box, label, [&](int x, int y) noexcept {
+    if (blob.area == 0) blob.first = {x, y};
+    ++blob.area;
+    sum_x += x;
+    sum_y += y;
+    tight = unite(tight, {x, y, 1, 1});
+  });
+  if (blob.area == 0) return blob;
+  blob.box = tight;
+  blob.center_x = static_cast<double>(sum_x) / blob.area;
+  blob.center_y = static_cast<double>(sum_y) / blob.area;
+  blob.sides = sides_touched(tight, labels.width, labels.height);
+  return blob;
+}
+
+/// Gives the region's pixels the label `to`: to merge blobs, or with to = 0 to remove one. O(box).
+inline void relabel_region(ImageView<std::uint16_t> labels, const Rect& box, std::uint16_t from,
+                           std::uint16_t to) noexcept {
+  for_each_pixel(labels, box, from, [&](int x, int y) noexcept { labels.at(x, y) = to; });
+}
+
+}  // namespace stereotrack

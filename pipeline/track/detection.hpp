@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "pipeline/core/bounded_vector.hpp"
+#include "pipeline/core/rect.hpp"
+
+namespace stereotrack {
+
+/// One object candidate of one frame: what the tracker is fed with.
+struct Detection {
+  Rect box;                     ///< tight, raw left picture [px]
+  FixedVector<Point, 48> hull;  ///< convex hull, raw left picture, clockwise on the screen
+  int area = 0;                 ///< pixels of its mask
+  bool has_depth = false;       ///< the fields up to position_covariance are known
+  double disparity = 0;         ///< median over its mask [px]
+  double disparity_sd = 0;      ///< standard deviation of that median [px]
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
+  Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
+  std::array<std::uint8_t, 3> colour{};  ///< mean Y, Cb, Cr over its mask; Cb = Cr = 128 for grey sources
+  double strength = 0;                   ///< 0..1, how far above the foreground threshold it stands
+
+  [[nodiscard]] double centre_x() const noexcept { return box.left + (box.width - 1) * 0.5; }
+  [[nodiscard]] double centre_y() const noexcept { return box.top + (box.height - 1) * 0.5; }
+};
+
+/// Where the tracker expects a target in the coming frame; bounds the search of the stages before it.
+struct Prediction {
+  std::uint32_t id = 0;
+  bool confirmed = false;
+  Rect box;                 ///< expected box, raw left picture, may reach outside [px]
+  double image_sd = 0;      ///< standard deviation of its centre, the larger axis [px]
+  bool has_depth = false;
+  double disparity = 0;     ///< [px]
+  double disparity_sd = 0;  ///< from the state's covariance [px]
+  std::array<std::uint8_t, 3> colour{};
+};
+
+}  // namespace stereotrack

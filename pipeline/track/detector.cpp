@@ -1,0 +1,446 @@
+#include "pipeline/track/detector.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/geometry/triangulate.hpp"
+#include "pipeline/shape/region.hpp"
+#include "pipeline/stereo/disparity.hpp"
+
+namespace stereotrack {
+
+namespace {
+
+// Histogram bins of the layer search: half a pixel of disparity.
+constexpr int kBin = kDisparityScale / 2;
+constexpr std::size_t kBins = 0x10000 / kBin;
+// A claim counts if at least this part of the smaller of target and blob is common to both.
+constexpr double kClaimPart = 0.25;
+// A depth that does not fit counts against a pixel at most this much.
+constexpr double kMostDepthCost = 16.0;
+// A region's disparity is never known better than this, whatever the number of pixels: errors of neighbours go
+// together, and calibration adds its own.
+constexpr double kLeastDisparitySd = 0.10;
+
+double square(double value) noexcept { return value * value; }
+
+int gap(const Rect& a, const Rect& b) noexcept {
+  const int across = std::max({a.left - b.right(), b.left - a.right(), 0});
+  const int down = std::max({a.top - b.bottom(), b.top - a.bottom(), 0});
+  return std::max(across, down);
+}
+
+}  // namespace
+
+Result<Detector> Detector::create(const Config& config, int width, int height, Arena& arena) noexcept {
+  if (config.min_area_px < 1 || !(config.merge_gap >= 0) || !(config.merge_depth >= 0) || !(config.split_depth > 0) ||
+      !(config.split_min_px > 0) || !(config.split_part > 0) || !(config.most_scatter > 0) ||
+      !(config.match_noise_px > 0)) {
+    return fail(Fault::kBadConfig);
+  }
+  const Result<ConvexHull> hull = ConvexHull::create({}, width, height, arena);
+  if (!hull) return fail(hull.error());
+  Detector self(*hull);
+  self.config_ = config;
+  self.width_ = width;
+  self.height_ = height;
+  self.candidates_ = BoundedVector<Candidate>(arena.array<Candidate>(kMaxCandidates));
+  self.detections_ = BoundedVector<Detection>(arena.array<Detection>(kMaxDetections));
+  self.histogram_ = arena.array<std::uint32_t>(kBins);
+  self.choice_ = arena.image<std::uint16_t>(width, height);
+  if (arena.failed()) return fail(Fault::kOutOfMemory);
+  return self;
+}
+
+void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
+  for (std::size_t k = 0; k < in.predictions.size() && layers_.size() < layers_.capacity(); ++k) {
+    const Prediction& target = in.predictions[k];
+    if (!target.confirmed) continue;
+    const Rect expected = intersect(target.box, {0, 0, width_, height_});
+    const Rect common = intersect(expected, blob.box);
+    if (common.empty()) continue;
+    int covered = 0;
+    int matching = 0;
+    int known = 0;
+    const double reach = 3 * (target.disparity_sd + config_.match_noise_px) + config_.split_depth * target.disparity;
+    for_each_pixel(in.labels, common, blob.label, [&](int x, int y) {
+      ++covered;
+      if (!target.has_depth || in.disparity.empty()) return;
+      const int d = in.disparity.at(x, y);
+      if (d == kNoDisparity) return;
+      ++known;
+      if (std::abs(d / static_cast<double>(kDisparityScale) - target.disparity) <= reach) ++matching;
+    });
+    const auto smaller = static_cast<double>(std::min<std::int64_t>(expected.area(), blob.area));
+    if (covered < kClaimPart * smaller) continue;
+    // Hidden behind something else: the pixels where it is expected are at another depth.
+    if (known > covered / 3 && matching * 8 < known) continue;
+    Layer layer{};
+    layer.x = target.box.left + (target.box.width - 1) * 0.5;
+    layer.y = target.box.top + (target.box.height - 1) * 0.5;
+    layer.half_width = 0.5 * target.box.width + target.image_sd;
+    layer.half_height = 0.5 * target.box.height + target.image_sd;
+    layer.has_place = true;
+    layer.has_depth = target.has_depth;
+    layer.disparity = target.disparity;
+    layer.disparity_sd = target.disparity_sd + config_.match_noise_px + 0.25 * config_.split_depth * target.disparity;
+    layer.claim = static_cast<int>(k);
+    (void)layers_.push(layer);
+  }
+}
+
+void Detector::layers_from_depth(const Input& in, const Blob& blob) noexcept {
+  if (in.disparity.empty()) return;
+  std::fill(histogram_.begin(), histogram_.end(), 0U);
+  std::uint32_t total = 0;
+  for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
+    const std::uint16_t d = in.disparity.at(x, y);
+    if (d == kNoDisparity) return;
+    ++histogram_[d / kBin];
+    ++total;
+  });
+  if (total < static_cast<std::uint32_t>(2 * config_.min_area_px)) return;
+  const auto least = static_cast<std::uint32_t>(std::max(config_.split_part * total, 1.0 * config_.min_area_px));
+  // A layer ends where the next split_depth of disparity holds next to nothing.
+  std::uint32_t in_layer = 0;
+  double weighted = 0;
+  std::size_t last = 0;
+  const auto close = [&] {
+    if (in_layer >= least && layers_.size() < layers_.capacity()) {
+      Layer layer{};
+      layer.disparity = weighted / in_layer;
+      layer.disparity_sd = std::max(config_.split_min_px, config_.split_depth * layer.disparity) * 0.5;
+      layer.has_depth = true;
+      layer.claim = -1;
+      (void)layers_.push(layer);
+    }
+    in_layer = 0;
+    weighted = 0;
+  };
+  const std::uint32_t noise = std::max<std::uint32_t>(total / 200, 1);
+  for (std::size_t bin = 0; bin < kBins; ++bin) {
+    if (histogram_[bin] <= noise) continue;
+    const double here = (static_cast<double>(bin) + 0.5) * kBin / kDisparityScale;
+    if (in_layer > 0) {
+      const double apart = (static_cast<double>(bin - last)) * kBin / kDisparityScale;
+      if (apart >= std::max(config_.split_min_px, config_.split_depth * here)) close();
+    }
+    in_layer += histogram_[bin];
+    weighted += here * histogram_[bin];
+    last = bin;
+  }
+  close();
+}
+
+std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
+  const int raw = in.disparity.empty() ? kNoDisparity : in.disparity.at(x, y);
+  std::size_t best = 0;
+  double least = 1e300;
+  for (std::size_t k = 0; k < layers_.size(); ++k) {
+    const Layer& layer = layers_[k];
+    double cost = 0;
+    if (layer.has_place) cost += square((x - layer.x) / layer.half_width) + square((y - layer.y) / layer.half_height);
+    if (layer.has_depth && raw != kNoDisparity) {
+      const double apart = raw / static_cast<double>(kDisparityScale) - layer.disparity;
+      cost += std::min(square(apart / layer.disparity_sd), kMostDepthCost);
+    }
+    if (cost < least) {
+      least = cost;
+      best = k;
+    }
+  }
+  return best;
+}
+
+void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim) noexcept {
+  Candidate candidate{};
+  candidate.label = label;
+  candidate.box = box;
+  candidate.claim = claim;
+  candidate.root = static_cast<std::uint16_t>(candidates_.size());
+  if (!candidates_.push(candidate)) reject(Rejection::kNoRoom);
+}
+
+void Detector::split(const Input& in, const Blob& blob) noexcept {
+  layers_.clear();
+  layers_from_claims(in, blob);
+  const bool claimed = layers_.size() >= 2;
+  if (!claimed) {
+    layers_.clear();
+    layers_from_depth(in, blob);
+  }
+  if (layers_.size() < 2) {
+    const std::uint16_t label = next_label_++;
+    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) { choice_.at(x, y) = label; });
+    add_candidate(label, blob.box, -1);
+    return;
+  }
+  const std::uint16_t first = next_label_;
+  next_label_ = static_cast<std::uint16_t>(next_label_ + layers_.size());
+  // Layers without a place get one from the pixels whose disparity tells, for those that have none.
+  if (!claimed) {
+    std::array<double, 8> n{};
+    std::array<double, 8> sx{};
+    std::array<double, 8> sy{};
+    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
+      if (in.disparity.at(x, y) == kNoDisparity) return;
+      const std::size_t k = choose(in, x, y);
+      n[k] += 1;
+      sx[k] += x;
+      sy[k] += y;
+    });
+    for (std::size_t k = 0; k < layers_.size(); ++k) {
+      layers_[k].x = n[k] > 0 ? sx[k] / n[k] : blob.center_x;
+      layers_[k].y = n[k] > 0 ? sy[k] / n[k] : blob.center_y;
+      // Wide, so that depth decides wherever it is known.
+      layers_[k].half_width = blob.box.width;
+      layers_[k].half_height = blob.box.height;
+      layers_[k].has_place = true;
+    }
+  }
+  for_each_pixel(in.labels, blob.box, blob.label,
+                 [&](int x, int y) { choice_.at(x, y) = static_cast<std::uint16_t>(first + choose(in, x, y)); });
+  // A pixel that stands alone among pixels of other layers follows them: 5x5 majority, written behind the reader.
+  for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
+    std::array<int, 8> votes{};
+    for (int v = std::max(y - 2, 0); v <= std::min(y + 2, height_ - 1); ++v) {
+      for (int u = std::max(x - 2, 0); u <= std::min(x + 2, width_ - 1); ++u) {
+        if (in.labels.at(u, v) == blob.label) ++votes[static_cast<std::size_t>(choice_.at(u, v) - first)];
+      }
+    }
+    const auto own = static_cast<std::size_t>(choice_.at(x, y) - first);
+    std::size_t most = own;
+    for (std::size_t k = 0; k < layers_.size(); ++k) {
+      if (votes[k] > votes[most]) most = k;
+    }
+    choice_.at(x, y) = static_cast<std::uint16_t>(first + most);
+  });
+  for (std::size_t k = 0; k < layers_.size(); ++k) {
+    add_candidate(static_cast<std::uint16_t>(first + k), blob.box, layers_[k].claim);
+  }
+}
+
+void Detector::measure(const Input& in, Candidate& candidate) noexcept {
+  const Blob blob = measure_region(in.labels, candidate.box, candidate.label);
+  candidate.area = blob.area;
+  if (blob.area == 0) return;
+  candidate.box = blob.box;
+  candidate.valid = 0;
+  candidate.has_depth = false;
+  if (in.disparity.empty()) return;
+  std::fill(histogram_.begin(), histogram_.end(), 0U);
+  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
+    const std::uint16_t d = in.disparity.at(x, y);
+    if (d == kNoDisparity) return;
+    ++histogram_[d / kBin];
+    ++candidate.valid;
+  });
+  if (candidate.valid == 0) return;
+  const auto half = static_cast<std::uint32_t>((candidate.valid + 1) / 2);
+  std::uint32_t below = 0;
+  std::size_t bin = 0;
+  while (below + histogram_[bin] < half) below += histogram_[bin++];
+  // Linear inside the bin.
+  candidate.disparity =
+      (static_cast<double>(bin) + (half - below) / static_cast<double>(histogram_[bin])) * kBin / kDisparityScale -
+      0.5 / kDisparityScale;
+  // Grow around the median until half of the pixels are inside.
+  std::uint32_t inside = histogram_[bin];
+  std::size_t reach = 0;
+  while (inside < half) {
+    ++reach;
+    if (bin >= reach) inside += histogram_[bin - reach];
+    if (bin + reach < kBins) inside += histogram_[bin + reach];
+  }
+  candidate.scatter = (static_cast<double>(reach) + 0.25) * kBin / kDisparityScale;
+  // A block's disparities hang together: about one independent value every 5 x 5 pixels.
+  const double independent = std::max(candidate.valid / 25.0, 1.0);
+  candidate.disparity_sd = std::sqrt(square(kLeastDisparitySd) + square(1.5 * candidate.scatter) / independent);
+  candidate.has_depth = true;
+}
+
+int Detector::claim_of(const Input& in, const Candidate& candidate) const noexcept {
+  if (candidate.claim >= 0) return candidate.claim;
+  int best = -1;
+  double most = 0.5;
+  for (std::size_t k = 0; k < in.predictions.size(); ++k) {
+    const Prediction& target = in.predictions[k];
+    if (!target.confirmed) continue;
+    const int slack = static_cast<int>(std::min(target.image_sd, 0.25 * std::max(target.box.width, target.box.height)) + 1.5);
+    const Rect reach{target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack,
+                     target.box.height + 2 * slack};
+    const double inside =
+        static_cast<double>(intersect(reach, candidate.box).area()) / static_cast<double>(candidate.box.area());
+    if (inside <= most) continue;
+    if (target.has_depth && candidate.has_depth) {
+      const double apart = std::abs(target.disparity - candidate.disparity);
+      const double allowed = 3 * (target.disparity_sd + candidate.disparity_sd) +
+                             2 * config_.merge_depth * std::max(target.disparity, candidate.disparity) + 1;
+      if (apart > allowed) continue;
+    }
+    most = inside;
+    best = static_cast<int>(k);
+  }
+  return best;
+}
+
+bool Detector::belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept {
+  const int claim_a = claim_of(in, a);
+  const int claim_b = claim_of(in, b);
+  if (claim_a >= 0 && claim_a == claim_b) return true;
+  if (claim_a >= 0 && claim_b >= 0) return false;
+  if (a.has_depth && b.has_depth) {
+    const double nearer = std::max(a.disparity, b.disparity);
+    const double apart = std::abs(a.disparity - b.disparity);
+    if (apart > std::max(config_.merge_depth * nearer, 1.0) + 2 * std::min(a.disparity_sd + b.disparity_sd, 2.0)) {
+      return false;
+    }
+  }
+  const Rect& larger = a.area >= b.area ? a.box : b.box;
+  return gap(a.box, b.box) <= config_.merge_gap * std::max(larger.width, larger.height);
+}
+
+void Detector::merge(const Input& in) noexcept {
+  const auto root_of = [&](std::size_t i) {
+    while (candidates_[i].root != i) i = candidates_[i].root;
+    return i;
+  };
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    if (candidates_[i].area == 0) continue;
+    for (std::size_t j = i + 1; j < candidates_.size(); ++j) {
+      if (candidates_[j].area == 0) continue;
+      const std::size_t a = root_of(i);
+      const std::size_t b = root_of(j);
+      if (a == b || !belong_together(in, candidates_[i], candidates_[j])) continue;
+      candidates_[std::max(a, b)].root = static_cast<std::uint16_t>(std::min(a, b));
+    }
+  }
+  bool merged = false;
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    const std::size_t root = root_of(i);
+    if (root == i || candidates_[i].area == 0) continue;
+    relabel_region(in.labels, candidates_[i].box, candidates_[i].label, candidates_[root].label);
+    candidates_[root].box = unite(candidates_[root].box, candidates_[i].box);
+    if (candidates_[root].claim < 0) candidates_[root].claim = candidates_[i].claim;
+    candidates_[i].area = 0;
+    merged = true;
+  }
+  if (!merged) return;
+  for (Candidate& candidate : candidates_) {
+    if (candidate.area > 0) measure(in, candidate);
+  }
+}
+
+std::span<Detector::Candidate> Detector::segment(const Input& in) noexcept {
+  rejections_ = {};
+  candidates_.clear();
+  next_label_ = 1;
+  for (const Blob& blob : in.blobs) split(in, blob);
+  // The labels of the pieces replace those of the blobs.
+  for (int y = 0; y < height_; ++y) {
+    std::uint16_t* label = in.labels.row(y);
+    for (int x = 0; x < width_; ++x) {
+      if (label[x] != 0) label[x] = choice_.at(x, y);
+    }
+  }
+  for (Candidate& candidate : candidates_) measure(in, candidate);
+  merge(in);
+  std::size_t kept = 0;
+  for (const Candidate& candidate : candidates_) {
+    if (candidate.area > 0) candidates_[kept++] = candidate;
+  }
+  candidates_.truncate(kept);
+  for (Candidate& candidate : candidates_) candidate.claim = claim_of(in, candidate);
+  return {candidates_.begin(), candidates_.size()};
+}
+
+bool Detector::describe(const Input& in, const Candidate& candidate, Detection& out) noexcept {
+  out = Detection{};
+  out.box = candidate.box;
+  out.area = candidate.area;
+  std::array<std::uint64_t, 3> colour{};
+  std::uint64_t strength = 0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double u_sum = 0;
+  double v_sum = 0;
+  const bool stereo = candidate.has_depth && in.rectifier != nullptr;
+  const double reach = 3 * candidate.scatter + 1;
+  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
+    colour[0] += in.y.at(x, y);
+    colour[1] += in.cb.empty() ? 128U : in.cb.at(x, y);
+    colour[2] += in.cr.empty() ? 128U : in.cr.at(x, y);
+    strength += in.strength.at(x, y);
+    if (!stereo) return;
+    const Rectifier::PointF place = in.rectifier->rectified_from_raw().at(x, y);
+    if (!place.valid()) return;
+    const int raw = in.disparity.empty() ? kNoDisparity : in.disparity.at(x, y);
+    double d = raw == kNoDisparity ? candidate.disparity : raw / static_cast<double>(kDisparityScale);
+    if (std::abs(d - candidate.disparity) > reach || d < kMinDisparity) d = candidate.disparity;
+    const RectifiedGeometry& g = in.rectifier->geometry();
+    const double scale = g.baseline / d;
+    mean += Eigen::Vector3d((place.x - g.cx_left) * scale, (place.y - g.cy) * scale, g.f * scale);
+    u_sum += place.x;
+    v_sum += place.y;
+    out.disparity_sd += 1;
+  });
+  for (std::size_t i = 0; i < 3; ++i) out.colour[i] = static_cast<std::uint8_t>(colour[i] / candidate.area);
+  out.strength = std::min(static_cast<double>(strength) / candidate.area / 160.0, 1.0);
+  const double placed = out.disparity_sd;
+  out.disparity_sd = 0;
+  if (stereo && placed > 0 && candidate.disparity >= kMinDisparity) {
+    const RectifiedGeometry& g = in.rectifier->geometry();
+    out.position = mean / placed;
+    // The mean of points at many disparities lies at its own disparity, f b / Z.
+    out.disparity = g.f * g.baseline / out.position.z();
+    out.disparity_sd = candidate.disparity_sd;
+    const double sigma_px = 0.5 + 0.03 * std::sqrt(static_cast<double>(candidate.area));
+    const std::optional<Estimate3> point =
+        triangulate(g, {u_sum / placed, v_sum / placed, out.disparity}, {sigma_px, sigma_px, out.disparity_sd});
+    if (point) {
+      out.position_covariance = point->covariance;
+      out.has_depth = true;
+    }
+  }
+  const Result<Hull> hull = hull_.run(in.labels, candidate.box, candidate.label);
+  if (hull.has_value()) out.hull = *hull;
+  return true;
+}
+
+std::span<const Detection> Detector::conclude(const Input& in) noexcept {
+  detections_.clear();
+  std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
+    return a.area != b.area ? a.area > b.area : a.label < b.label;
+  });
+  const std::uint16_t offset = 0x8000;
+  for (const Candidate& candidate : candidates_) {
+    if (candidate.area < config_.min_area_px) {
+      reject(Rejection::kSmall);
+      continue;
+    }
+    const bool known = candidate.claim >= 0;
+    if (in.rectifier != nullptr && !candidate.has_depth && !known) {
+      reject(Rejection::kNoTexture);
+      continue;
+    }
+    if (candidate.has_depth && candidate.scatter > std::max(config_.most_scatter * candidate.disparity, 1.5) && !known) {
+      reject(Rejection::kInconsistent);
+      continue;
+    }
+    Detection detection;
+    if (detections_.full() || !describe(in, candidate, detection)) {
+      reject(Rejection::kNoRoom);
+      continue;
+    }
+    (void)detections_.push(detection);
+    relabel_region(in.labels, candidate.box, candidate.label, static_cast<std::uint16_t>(offset | detections_.size()));
+  }
+  for (int y = 0; y < height_; ++y) {
+    std::uint16_t* label = in.labels.row(y);
+    for (int x = 0; x < width_; ++x) {
+      label[x] = (label[x] & offset) != 0 ? static_cast<std::uint16_t>(label[x] & 0x7FFFU) : std::uint16_t{0};
+    }
+  }
+  return detections_.view();
+}
+
+}  // namespace stereotrack

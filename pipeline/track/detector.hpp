@@ -1,0 +1,136 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/bounded_vector.hpp"
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/result.hpp"
+#include "pipeline/geometry/rectify.hpp"
+#include "pipeline/shape/blob_extractor.hpp"
+#include "pipeline/shape/convex_hull.hpp"
+#include "pipeline/track/detection.hpp"
+
+namespace stereotrack {
+
+/// Why a candidate is no object.
+enum class Rejection : std::uint8_t {
+  kSmall,         ///< fewer than min_area_px pixels
+  kNoTexture,     ///< stereo source, but nothing in it could be matched
+  kInconsistent,  ///< its disparities scatter too much to be one object
+  kShadow,        ///< the shadow test left nothing of it
+  kNoRoom,        ///< more candidates than the detector holds
+};
+inline constexpr std::size_t kRejections = 5;
+[[nodiscard]] constexpr const char* to_string(Rejection why) noexcept {
+  constexpr std::array<const char*, kRejections> kNames{"small", "no_texture", "inconsistent_depth", "shadow",
+                                                        "no_room"};
+  return kNames[static_cast<std::size_t>(why)];
+}
+using RejectionCounts = std::array<std::uint32_t, kRejections>;
+
+/// Blobs and depth -> detections: candidates are split, merged and rejected.
+///
+/// Split: where two or more confirmed targets are expected in one blob, each pixel goes to the target that
+/// explains it best,
+///     cost = ((x - x_t) / w_t)^2 + ((y - y_t) / h_t)^2 + ((d - d_t) / s_t)^2,
+/// else a blob whose disparities form layers with a gap of split_depth between them is split into the layers.
+/// Merge: pieces that one confirmed target explains, or that are close in the picture (merge_gap) and in depth
+/// (merge_depth) and not claimed by different confirmed targets, are one object.
+/// Depth of a piece: median of its disparities; its scatter is the median absolute deviation; its position the
+/// mean of its pixels' points (pixels without disparity take the median).
+///
+/// Raw left picture throughout; `disparity` is given there too. One instance a thread.
+/// O(pixels of the blobs x claims).
+class Detector {
+ public:
+  static constexpr int kMaxCandidates = 256;
+  static constexpr int kMaxDetections = 64;
+
+  struct Config {
+    int min_area_px = 24;         ///< 1..1e6
+    double merge_gap = 0.30;      ///< gap between boxes, as a fraction of the larger one's longer side, 0..2
+    double merge_depth = 0.10;    ///< difference of disparity, as a fraction of the larger, 0..1
+    double split_depth = 0.12;    ///< gap between layers, as a fraction of the disparity, 0.01..1
+    double split_min_px = 2.0;    ///< and at least this much [px], 0.5..50
+    double split_part = 0.12;     ///< a layer is at least this part of its blob, 0.01..0.5
+    double most_scatter = 0.15;   ///< median absolute deviation of an object's disparities, as a fraction, 0.01..1
+    double match_noise_px = 0.25; ///< standard deviation of a disparity [px], 0.02..5
+  };
+
+  struct Input {
+    std::span<const Blob> blobs;
+    ImageView<std::uint16_t> labels;  ///< of the blobs; receives label i + 1 for detection i, 0 elsewhere
+    ImageView<const std::uint16_t> disparity;  ///< 1/16 px in the raw left picture, empty for mono
+    ImageView<const std::uint8_t> y;
+    ImageView<const std::uint8_t> cb;  ///< empty for grey
+    ImageView<const std::uint8_t> cr;
+    ImageView<const std::uint8_t> strength;  ///< distance to the background, any unit
+    std::span<const Prediction> predictions;
+    const Rectifier* rectifier = nullptr;  ///< null for mono
+  };
+
+  /// An object in the making: what is left of the blobs after splitting and merging.
+  struct Candidate {
+    std::uint16_t label;  ///< of its pixels in Input::labels
+    Rect box;             ///< [px]
+    int area;             ///< [px]
+    int claim;            ///< index of the confirmed prediction that explains it, -1 = none
+    int valid;            ///< pixels with a disparity of their own
+    bool has_depth;       ///< disparity and disparity_sd are known
+    double disparity;     ///< median [px]
+    double disparity_sd;  ///< [px]
+    double scatter;       ///< median absolute deviation [px]
+    std::uint16_t root;   ///< used while merging
+  };
+
+  /// Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<Detector> create(const Config& config, int width, int height, Arena& arena) noexcept;
+
+  /// Splits and merges. The caller may then give candidates a disparity from elsewhere (small or blurred
+  /// objects, where single pixels have none) before conclude(). Valid until the next segment().
+  [[nodiscard]] std::span<Candidate> segment(const Input& in) noexcept;
+
+  /// Rejects, and makes detections of the rest, largest first. Valid until the next conclude().
+  [[nodiscard]] std::span<const Detection> conclude(const Input& in) noexcept;
+
+  /// Rejected candidates of the last run.
+  [[nodiscard]] const RejectionCounts& rejections() const noexcept { return rejections_; }
+
+ private:
+  struct Layer {
+    double x, y, half_width, half_height;
+    double disparity, disparity_sd;
+    bool has_place, has_depth;
+    int claim;
+  };
+
+  explicit Detector(const ConvexHull& hull) noexcept : hull_(hull) {}
+  void split(const Input& in, const Blob& blob) noexcept;
+  void layers_from_claims(const Input& in, const Blob& blob) noexcept;
+  void layers_from_depth(const Input& in, const Blob& blob) noexcept;
+  [[nodiscard]] std::size_t choose(const Input& in, int x, int y) const noexcept;
+  void add_candidate(std::uint16_t label, const Rect& box, int claim) noexcept;
+  void measure(const Input& in, Candidate& candidate) noexcept;
+  void merge(const Input& in) noexcept;
+  [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
+  [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept;
+  [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
+  void reject(Rejection why) noexcept { ++rejections_[static_cast<std::size_t>(why)]; }
+
+  Config config_;
+  int width_ = 0;
+  int height_ = 0;
+  std::uint16_t next_label_ = 1;
+  ConvexHull hull_;
+  RejectionCounts rejections_{};
+  BoundedVector<Candidate> candidates_;
+  BoundedVector<Detection> detections_;
+  std::span<std::uint32_t> histogram_;
+  FixedVector<Layer, 8> layers_;
+  ImageView<std::uint16_t> choice_;
+};
+
+}  // namespace stereotrack

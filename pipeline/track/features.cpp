@@ -1,0 +1,175 @@
+#include "pipeline/track/features.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+namespace stereotrack {
+
+namespace {
+
+constexpr int kReach = Features::kPatch / 2;
+constexpr int kTensorReach = 2;
+constexpr int kArea = Features::kPatch * Features::kPatch;
+// Where a patch was found to about this many pixels.
+constexpr double kSearchNoise = 0.4;
+
+using Patch = std::array<std::uint8_t, kArea>;
+
+bool patch_fits(ImageView<const std::uint8_t> luma, int x, int y) noexcept {
+  return x >= kReach && y >= kReach && x + kReach < luma.width && y + kReach < luma.height;
+}
+
+void cut(ImageView<const std::uint8_t> luma, int x, int y, Patch& patch) noexcept {
+  for (int v = 0; v < Features::kPatch; ++v) {
+    std::copy_n(luma.row(y - kReach + v) + x - kReach, Features::kPatch, patch.begin() + v * Features::kPatch);
+  }
+}
+
+// Sum of |(a - mean a) - (b - mean b)|, times kArea so that the means stay integers.
+int zero_mean_difference(const Patch& patch, int patch_sum, ImageView<const std::uint8_t> luma, int x, int y) noexcept {
+  int sum = 0;
+  for (int v = -kReach; v <= kReach; ++v) {
+    const std::uint8_t* row = luma.row(y + v) + x;
+    for (int u = -kReach; u <= kReach; ++u) sum += row[u];
+  }
+  const int shift = patch_sum - sum;
+  int difference = 0;
+  for (int v = 0; v < Features::kPatch; ++v) {
+    const std::uint8_t* row = luma.row(y - kReach + v) + x - kReach;
+    for (int u = 0; u < Features::kPatch; ++u) {
+      difference += std::abs((patch[static_cast<std::size_t>(v * Features::kPatch + u)] - row[u]) * kArea - shift);
+    }
+  }
+  return difference / kArea;
+}
+
+double parabola(int before, int best, int after) noexcept {
+  const int curvature = before - 2 * best + after;
+  return curvature > 0 ? 0.5 * (before - after) / curvature : 0.0;
+}
+
+}  // namespace
+
+Result<Features> Features::create(const Config& config, int width, int height, Arena& arena) noexcept {
+  if (config.corner_quality < 1 || config.most_difference < 1 || config.search_px < 1) return fail(Fault::kBadConfig);
+  if (width < 1 || height < 1) return fail(Fault::kBadSize);
+  Features self;
+  self.config_ = config;
+  self.strength_ = arena.image<float>(width, height);
+  if (arena.failed()) return fail(Fault::kOutOfMemory);
+  return self;
+}
+
+double Features::corner_strength(ImageView<const std::uint8_t> luma, int x, int y) noexcept {
+  constexpr int kEdge = kTensorReach + 1;
+  if (x < kEdge || y < kEdge || x + kEdge >= luma.width || y + kEdge >= luma.height) return 0;
+  std::int64_t a = 0;
+  std::int64_t b = 0;
+  std::int64_t c = 0;
+  for (int v = y - kTensorReach; v <= y + kTensorReach; ++v) {
+    for (int u = x - kTensorReach; u <= x + kTensorReach; ++u) {
+      const int gx = luma.at(u + 1, v) - luma.at(u - 1, v);
+      const int gy = luma.at(u, v + 1) - luma.at(u, v - 1);
+      a += gx * gx;
+      b += gx * gy;
+      c += gy * gy;
+    }
+  }
+  const auto sum = static_cast<double>(a + c);
+  const auto apart = static_cast<double>(a - c);
+  const auto mixed = static_cast<double>(2 * b);
+  constexpr double kWindow = (2 * kTensorReach + 1) * (2 * kTensorReach + 1);
+  return 0.5 * (sum - std::sqrt(apart * apart + mixed * mixed)) / kWindow;
+}
+
+void Features::follow(ImageView<const std::uint8_t> luma, double dt, double acceleration_sd, Set& set) const noexcept {
+  const ConstantVelocityFilter<2>::Matrix R = ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
+  Set kept;
+  for (Feature& feature : set) {
+    feature.filter.predict(dt, acceleration_sd);
+    const auto expected = feature.filter.position();
+    const auto S = (feature.filter.position_covariance() + R).eval();
+    const auto reach = [&](double variance) {
+      return std::clamp(static_cast<int>(std::ceil(3 * std::sqrt(variance))), 2, config_.search_px);
+    };
+    const int reach_x = reach(S(0, 0));
+    const int reach_y = reach(S(1, 1));
+    const int x0 = static_cast<int>(std::floor(expected.x() + 0.5));
+    const int y0 = static_cast<int>(std::floor(expected.y() + 0.5));
+    int patch_sum = 0;
+    for (const std::uint8_t value : feature.patch) patch_sum += value;
+    int best = std::numeric_limits<int>::max();
+    int best_x = 0;
+    int best_y = 0;
+    for (int y = y0 - reach_y; y <= y0 + reach_y; ++y) {
+      for (int x = x0 - reach_x; x <= x0 + reach_x; ++x) {
+        if (!patch_fits(luma, x, y)) continue;
+        const int cost = zero_mean_difference(feature.patch, patch_sum, luma, x, y);
+        if (cost < best) {
+          best = cost;
+          best_x = x;
+          best_y = y;
+        }
+      }
+    }
+    if (best > config_.most_difference * kArea) continue;
+    double sub_x = 0;
+    double sub_y = 0;
+    if (patch_fits(luma, best_x - 1, best_y) && patch_fits(luma, best_x + 1, best_y)) {
+      sub_x = parabola(zero_mean_difference(feature.patch, patch_sum, luma, best_x - 1, best_y), best,
+                       zero_mean_difference(feature.patch, patch_sum, luma, best_x + 1, best_y));
+    }
+    if (patch_fits(luma, best_x, best_y - 1) && patch_fits(luma, best_x, best_y + 1)) {
+      sub_y = parabola(zero_mean_difference(feature.patch, patch_sum, luma, best_x, best_y - 1), best,
+                       zero_mean_difference(feature.patch, patch_sum, luma, best_x, best_y + 1));
+    }
+    if (!feature.filter.update({best_x + sub_x, best_y + sub_y}, R)) continue;
+    cut(luma, best_x, best_y, feature.patch);
+    feature.seen = true;
+    (void)kept.push(feature);
+  }
+  set = kept;
+}
+
+void Features::refill(ImageView<const std::uint8_t> luma, ImageView<const std::uint16_t> labels, std::uint16_t label,
+                      const Rect& box, const ConstantVelocityFilter<2>::Vector& velocity, double velocity_sd,
+                      Set& set) noexcept {
+  const Rect inside = intersect(box, {0, 0, luma.width, luma.height});
+  if (inside.empty() || set.size() == Set::capacity()) return;
+  for (int y = inside.top; y < inside.bottom(); ++y) {
+    for (int x = inside.left; x < inside.right(); ++x) {
+      strength_.at(x, y) = labels.at(x, y) == label && patch_fits(luma, x, y)
+                               ? static_cast<float>(corner_strength(luma, x, y))
+                               : 0.0F;
+    }
+  }
+  const auto clear_around = [&](double px, double py) {
+    const Rect taken = intersect(inside, {static_cast<int>(px) - kPatch, static_cast<int>(py) - kPatch, 2 * kPatch + 1,
+                                          2 * kPatch + 1});
+    for (int y = taken.top; y < taken.bottom(); ++y) std::fill_n(&strength_.at(taken.left, y), taken.width, 0.0F);
+  };
+  for (const Feature& feature : set) clear_around(feature.filter.position().x(), feature.filter.position().y());
+  const ConstantVelocityFilter<2>::Matrix R = ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
+  while (set.size() < Set::capacity()) {
+    auto best = static_cast<float>(config_.corner_quality);
+    Point where{-1, -1};
+    for (int y = inside.top; y < inside.bottom(); ++y) {
+      for (int x = inside.left; x < inside.right(); ++x) {
+        if (strength_.at(x, y) > best) {
+          best = strength_.at(x, y);
+          where = {x, y};
+        }
+      }
+    }
+    if (where.x < 0) return;
+    Feature feature;
+    feature.filter.start({static_cast<double>(where.x), static_cast<double>(where.y)}, R, velocity_sd, velocity);
+    cut(luma, where.x, where.y, feature.patch);
+    (void)set.push(feature);
+    clear_around(where.x, where.y);
+  }
+}
+
+}  // namespace stereotrack

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/bounded_vector.hpp"
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/rect.hpp"
+#include "pipeline/core/result.hpp"
+#include "pipeline/track/kalman.hpp"
+
+namespace stereotrack {
+
+/// Corner features of a target, followed from frame to frame as the document does: each has a Kalman filter of
+/// position and velocity (3.24-3.32); its prediction and innovation covariance bound the window in which the
+/// feature's patch is searched.
+///
+/// Corners: smaller eigenvalue of the structure tensor over a 5x5 window (Shi and Tomasi 1994)
+///     l = (a + c - sqrt((a - c)^2 + 4 b^2)) / 2,   [a b; b c] = sum [gx^2 gx gy; gx gy gy^2]
+/// Search: sum of absolute differences of the 9x9 patch, each less its mean (so that a change of the light does
+/// not matter), over all integer positions of the window; then a parabola each way for the sub-pixel.
+class Features {
+ public:
+  static constexpr int kPatch = 9;     ///< side of a patch [px]
+  static constexpr int kMost = 12;     ///< features a target
+
+  struct Config {
+    int corner_quality = 400;  ///< smallest eigenvalue of a corner [grey levels^2 per pixel of gradient], 1..1e6
+    int most_difference = 14;  ///< mean absolute difference above which a feature is lost [grey levels], 1..255
+    int search_px = 24;        ///< the window never reaches further than this from the prediction [px], 1..64
+  };
+
+  struct Feature {
+    ConstantVelocityFilter<2> filter;  ///< raw left picture [px, px/s]
+    std::array<std::uint8_t, kPatch * kPatch> patch{};
+    bool seen = false;  ///< found in the latest frame
+  };
+  using Set = FixedVector<Feature, kMost>;
+
+  /// Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<Features> create(const Config& config, int width, int height, Arena& arena) noexcept;
+
+  /// Moves all features on by dt and searches each in its window of `luma`. Lost ones leave the set.
+  /// acceleration_sd: process noise [px/s^2]. O(features x window x patch).
+  void follow(ImageView<const std::uint8_t> luma, double dt, double acceleration_sd, Set& set) const noexcept;
+
+  /// Fills the set with corners of `luma` where labels == label inside box, at least a patch apart from those
+  /// it has. velocity, velocity_sd: start of the new filters [px/s]. O(box).
+  void refill(ImageView<const std::uint8_t> luma, ImageView<const std::uint16_t> labels, std::uint16_t label,
+              const Rect& box, const ConstantVelocityFilter<2>::Vector& velocity, double velocity_sd,
+              Set& set) noexcept;
+
+  /// Smaller eigenvalue at (x, y), per pixel of the window; 0 at the picture's border.
+  [[nodiscard]] static double corner_strength(ImageView<const std::uint8_t> luma, int x, int y) noexcept;
+
+ private:
+  Config config_;
+  ImageView<float> strength_;
+};
+
+}  // namespace stereotrack

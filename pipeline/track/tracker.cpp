@@ -1,0 +1,289 @@
+#include "pipeline/track/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stereotrack {
+
+namespace {
+
+using Matrix2 = ConstantVelocityFilter<2>::Matrix;
+using Vector2 = ConstantVelocityFilter<2>::Vector;
+
+// Size and colour tell targets apart, but may not outweigh where they are: each adds at most this.
+constexpr double kMostSoftCost = 9.0;
+// One standard deviation of the size between two frames, as a ratio of areas, and of the mean colour.
+constexpr double kAreaRatioSd = 1.5;
+constexpr double kLumaSd = 14.0;
+constexpr double kChromaSd = 6.0;
+// Smoothing of size and colour: a partly hidden target must not be learnt at once.
+constexpr double kAppearanceRate = 0.2;
+
+double square(double value) noexcept { return value * value; }
+
+Matrix2 centre_noise(const Tracker::Config& config, const Rect& box) noexcept {
+  Matrix2 R = Matrix2::Zero();
+  R(0, 0) = square(config.centre_noise_px + config.centre_noise_size * box.width);
+  R(1, 1) = square(config.centre_noise_px + config.centre_noise_size * box.height);
+  return R;
+}
+
+}  // namespace
+
+Result<Tracker> Tracker::create(const Config& config, const View& view, Arena& arena) noexcept {
+  if (config.confirm_hits < 1 || config.confirm_hits > 20 || config.tentative_misses < 1 || !(config.coast_s >= 0) ||
+      !(config.gate > 0) || !(config.acceleration > 0) || !(config.initial_speed > 0) ||
+      !(config.centre_noise_px > 0) || !(config.centre_noise_size >= 0)) {
+    return fail(Fault::kBadConfig);
+  }
+  if (view.width < 1 || view.height < 1 || !(view.focal > 0) || !(view.focal_baseline >= 0)) {
+    return fail(Fault::kBadSize);
+  }
+  Tracker self;
+  self.config_ = config;
+  self.view_ = view;
+  Result<Assignment> assignment = Assignment::create(kMaxTracks, kMaxDetections, arena);
+  if (!assignment) return fail(assignment.error());
+  self.assignment_ = *assignment;
+  self.targets_ = BoundedVector<Target>(arena.array<Target>(kMaxTracks));
+  self.predictions_ = BoundedVector<Prediction>(arena.array<Prediction>(kMaxTracks));
+  self.reports_ = BoundedVector<TrackReport>(arena.array<TrackReport>(kMaxTracks));
+  self.costs_ = arena.array<double>(static_cast<std::size_t>(kMaxTracks) * kMaxDetections);
+  self.detection_of_row_ = arena.array<int>(kMaxTracks);
+  self.target_of_row_ = arena.array<int>(kMaxTracks);
+  self.detection_of_column_ = arena.array<int>(kMaxDetections);
+  self.detection_used_ = arena.array<unsigned char>(kMaxDetections);
+  self.target_used_ = arena.array<unsigned char>(kMaxTracks);
+  if (arena.failed()) return fail(Fault::kOutOfMemory);
+  return self;
+}
+
+std::span<const Prediction> Tracker::predict(double dt) noexcept {
+  dt_ = dt;
+  predictions_.clear();
+  for (Target& target : targets_) {
+    target.image.predict(dt, config_.acceleration * view_.focal);
+    const double distance = std::max(target.space.position().z(), 0.0);
+    if (target.has_depth) target.space.predict(dt, config_.acceleration * distance);
+    Prediction prediction;
+    prediction.id = target.id;
+    prediction.confirmed = target.state != TrackState::kTentative;
+    const Vector2 centre = target.image.position();
+    prediction.box = {static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
+                      static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
+                      static_cast<int>(target.width + 0.5), static_cast<int>(target.height + 0.5)};
+    const Matrix2 P = target.image.position_covariance();
+    prediction.image_sd = std::sqrt(std::max(P(0, 0), P(1, 1)));
+    const double z = target.space.position().z();
+    prediction.has_depth = target.has_depth && z > 0 && view_.focal_baseline > 0;
+    if (prediction.has_depth) {
+      prediction.disparity = view_.focal_baseline / z;
+      prediction.disparity_sd = prediction.disparity / z * std::sqrt(target.space.position_covariance()(2, 2));
+    }
+    for (std::size_t i = 0; i < 3; ++i) prediction.colour[i] = static_cast<std::uint8_t>(target.colour[i] + 0.5);
+    (void)predictions_.push(prediction);
+  }
+  return predictions_.view();
+}
+
+double Tracker::cost(const Target& target, const Detection& detection) const noexcept {
+  const Vector2 z(detection.centre_x(), detection.centre_y());
+  const auto innovation = target.image.innovation(z, centre_noise(config_, detection.box));
+  // Half the step again as standard deviation along the motion: a frame may be missing without a trace.
+  const Vector2 step = target.image.velocity() * (dt_ * 0.5);
+  const Matrix2 S = innovation.S + step * step.transpose();
+  const double determinant = S(0, 0) * S(1, 1) - S(0, 1) * S(1, 0);
+  if (!(determinant > 0)) return Assignment::kForbidden;
+  const Vector2& y = innovation.y;
+  const double in_picture =
+      (S(1, 1) * y.x() * y.x() - 2 * S(0, 1) * y.x() * y.y() + S(0, 0) * y.y() * y.y()) / determinant;
+  const double limit = square(config_.gate);
+  if (!(in_picture <= limit)) return Assignment::kForbidden;
+
+  double in_depth = 0;
+  const double z_predicted = target.space.position().z();
+  if (target.has_depth && detection.has_depth && z_predicted > 0) {
+    const double expected = view_.focal_baseline / z_predicted;
+    const double expected_variance = square(expected / z_predicted) * target.space.position_covariance()(2, 2);
+    const double step_d = expected / z_predicted * target.space.velocity().z() * dt_ * 0.5;
+    in_depth = square(detection.disparity - expected) /
+               (expected_variance + square(detection.disparity_sd) + square(step_d) + 0.25);
+    if (!(in_depth <= limit)) return Assignment::kForbidden;
+  }
+  const double ratio = detection.area > target.area ? detection.area / target.area : target.area / detection.area;
+  const double in_size = std::min(square((ratio - 1) / kAreaRatioSd), kMostSoftCost);
+  double in_colour = square((detection.colour[0] - target.colour[0]) / kLumaSd);
+  for (std::size_t i = 1; i < 3; ++i) in_colour += square((detection.colour[i] - target.colour[i]) / kChromaSd);
+  return in_picture + in_depth + in_size + std::min(in_colour, kMostSoftCost);
+}
+
+void Tracker::associate(std::span<const Detection> detections, bool confirmed) noexcept {
+  int rows = 0;
+  int columns = 0;
+  for (std::size_t j = 0; j < detections.size(); ++j) {
+    if (detection_used_[j] == 0) detection_of_column_[static_cast<std::size_t>(columns++)] = static_cast<int>(j);
+  }
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    if ((targets_[i].state != TrackState::kTentative) == confirmed) {
+      target_of_row_[static_cast<std::size_t>(rows++)] = static_cast<int>(i);
+    }
+  }
+  for (int row = 0; row < rows; ++row) {
+    const Target& target = targets_[static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)])];
+    for (int column = 0; column < columns; ++column) {
+      const int j = detection_of_column_[static_cast<std::size_t>(column)];
+      costs_[static_cast<std::size_t>(row * columns + column)] = cost(target, detections[static_cast<std::size_t>(j)]);
+    }
+  }
+  const double alone = 2 * square(config_.gate) + 2 * kMostSoftCost;
+  assignment_.solve(costs_, rows, columns, alone, detection_of_row_);
+  for (int row = 0; row < rows; ++row) {
+    const int column = detection_of_row_[static_cast<std::size_t>(row)];
+    if (column == Assignment::kNone) continue;
+    const auto i = static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)]);
+    const auto j = static_cast<std::size_t>(detection_of_column_[static_cast<std::size_t>(column)]);
+    measure(targets_[i], detections[j]);
+    target_used_[i] = 1;
+    detection_used_[j] = 1;
+  }
+}
+
+void Tracker::measure(Target& target, const Detection& detection) noexcept {
+  const Vector2 z(detection.centre_x(), detection.centre_y());
+  (void)target.image.update(z, centre_noise(config_, detection.box));
+  if (detection.has_depth) {
+    if (target.has_depth) {
+      (void)target.space.update(detection.position, detection.position_covariance);
+    } else {
+      target.space.start(detection.position, detection.position_covariance,
+                         config_.initial_speed * detection.position.z());
+      target.has_depth = true;
+    }
+  }
+  target.measured = true;
+  target.misses_in_a_row = 0;
+  target.unseen_s = 0;
+  ++target.hits;
+  const double rate = target.hits < 5 ? 1.0 / target.hits : kAppearanceRate;
+  target.width += (detection.box.width - target.width) * rate;
+  target.height += (detection.box.height - target.height) * rate;
+  target.area += (detection.area - target.area) * rate;
+  for (std::size_t i = 0; i < 3; ++i) target.colour[i] += (detection.colour[i] - target.colour[i]) * rate;
+  target.quality += (0.5 + 0.5 * detection.strength - target.quality) * 0.2;
+  const double way = std::sqrt(square(z.x() - target.first_x) + square(z.y() - target.first_y));
+  target.travelled_px = std::max(target.travelled_px, way);
+  target.box = detection.box;
+  target.hull = detection.hull;
+  if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits &&
+      target.travelled_px >= config_.travel_px) {
+    target.state = TrackState::kConfirmed;
+  } else if (target.state == TrackState::kCoasting) {
+    target.state = TrackState::kConfirmed;
+  }
+}
+
+void Tracker::miss(Target& target) noexcept {
+  target.measured = false;
+  ++target.misses_in_a_row;
+  target.quality *= 0.9;
+  if (target.state == TrackState::kConfirmed) target.state = TrackState::kCoasting;
+  // The box and the hull go where the target is expected.
+  const Vector2 centre = target.image.position();
+  const Rect moved{static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
+                   static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
+                   std::max(static_cast<int>(target.width + 0.5), 1), std::max(static_cast<int>(target.height + 0.5), 1)};
+  target.box = intersect(moved, {0, 0, view_.width, view_.height});
+  target.hull.clear();
+}
+
+void Tracker::start(const Detection& detection) noexcept {
+  Target target{};
+  target.id = next_id_;
+  target.state = TrackState::kTentative;
+  target.width = detection.box.width;
+  target.height = detection.box.height;
+  target.area = detection.area;
+  target.first_x = detection.centre_x();
+  target.first_y = detection.centre_y();
+  target.quality = 0.25 + 0.25 * detection.strength;
+  for (std::size_t i = 0; i < 3; ++i) target.colour[i] = detection.colour[i];
+  target.box = detection.box;
+  target.hull = detection.hull;
+  target.hits = 1;
+  target.measured = true;
+  target.image.start(Vector2(target.first_x, target.first_y), centre_noise(config_, detection.box),
+                     config_.initial_speed * view_.focal);
+  if (detection.has_depth) {
+    target.space.start(detection.position, detection.position_covariance,
+                       config_.initial_speed * detection.position.z());
+    target.has_depth = true;
+  }
+  if (config_.confirm_hits == 1 && config_.travel_px <= 0) target.state = TrackState::kConfirmed;
+  if (targets_.push(target)) {
+    ++next_id_;
+  } else {
+    ++refused_;
+  }
+}
+
+bool Tracker::expired(const Target& target) const noexcept {
+  if (target.measured) return false;
+  if (target.state == TrackState::kTentative) return target.misses_in_a_row >= config_.tentative_misses;
+  return target.unseen_s > config_.coast_s || target.box.empty();
+}
+
+void Tracker::update(std::span<const Detection> detections) noexcept {
+  detections = detections.first(std::min<std::size_t>(detections.size(), kMaxDetections));
+  std::fill(detection_used_.begin(), detection_used_.end(), static_cast<unsigned char>(0));
+  std::fill(target_used_.begin(), target_used_.end(), static_cast<unsigned char>(0));
+  for (Target& target : targets_) {
+    target.age_s += dt_;
+    target.unseen_s += dt_;
+    ++target.frames;
+  }
+  // Which targets are confirmed is decided before either round: a target confirmed now waits for the next frame.
+  const std::size_t known = targets_.size();
+  associate(detections, true);
+  associate(detections, false);
+  for (std::size_t i = 0; i < known; ++i) {
+    if (target_used_[i] == 0) miss(targets_[i]);
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    if (expired(targets_[i])) continue;
+    if (kept != i) targets_[kept] = targets_[i];
+    ++kept;
+  }
+  targets_.truncate(kept);
+  for (std::size_t j = 0; j < detections.size(); ++j) {
+    if (detection_used_[j] == 0) start(detections[j]);
+  }
+  report();
+}
+
+void Tracker::report() noexcept {
+  reports_.clear();
+  for (const Target& target : targets_) {
+    TrackReport out;
+    out.id = target.id;
+    out.state = target.state;
+    out.measured = target.measured;
+    out.has_depth = target.has_depth;
+    out.box = target.box;
+    out.hull = target.hull;
+    out.image_x = target.image.position().x();
+    out.image_y = target.image.position().y();
+    out.image_vx = target.image.velocity().x();
+    out.image_vy = target.image.velocity().y();
+    if (target.has_depth) {
+      out.position = target.space.position();
+      out.velocity = target.space.velocity();
+      out.covariance = target.space.covariance();
+    }
+    out.confidence = target.quality;
+    out.age_s = target.age_s;
+    (void)reports_.push(out);
+  }
+}
+
+}  // namespace stereotrack

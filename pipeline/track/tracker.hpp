@@ -1,0 +1,122 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/bounded_vector.hpp"
+#include "pipeline/core/result.hpp"
+#include "pipeline/track/assignment.hpp"
+#include "pipeline/track/detection.hpp"
+#include "pipeline/track/kalman.hpp"
+#include "pipeline/track/track_report.hpp"
+
+namespace stereotrack {
+
+/// From detections to targets with an identity (3.24-3.32).
+///
+/// A target is followed by two filters of nearly constant velocity: one of its box centre in the raw left
+/// picture, which always runs, and one of its position in space, which runs while stereo sees it. Times come
+/// from the frames' capture times.
+///
+/// Association: squared Mahalanobis distance in the picture, in disparity, and of size and colour, added and
+/// solved as one assignment problem; confirmed targets first, tentative ones among what is left. The gate has
+/// room for one missing frame: the distance covered in one step counts as uncertainty along the motion.
+///
+/// Life: a detection without a target starts a tentative one. confirm_hits detections within
+/// confirm_hits + 2 frames confirm it; tentative_misses frames without one remove it. A confirmed target
+/// without detection coasts on its prediction for coast_s, or until it left the picture.
+///
+/// One thread. O(tracks x detections), no allocation after create().
+class Tracker {
+ public:
+  static constexpr int kMaxTracks = 64;
+  static constexpr int kMaxDetections = 64;
+
+  struct Config {
+    int confirm_hits = 3;              ///< detections that confirm a target, 1..20
+    int tentative_misses = 2;          ///< frames without detection that remove a tentative target, 1..10
+    double coast_s = 1.5;              ///< how long a confirmed target lives without detections [s], 0..60
+    double gate = 4.0;                 ///< association gate [standard deviations], 1..10
+    double acceleration = 1.5;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
+    double initial_speed = 2.0;        ///< uncertainty of a new target's speed as a fraction of its distance [1/s]
+    double centre_noise_px = 0.7;      ///< noise of a box centre [px], 0.05..20
+    double centre_noise_size = 0.05;   ///< and what it grows by with the box's size [1], 0..1
+    double travel_px = 3.0;            ///< way in the picture that tells a target from flicker [px], 0..100
+  };
+
+  /// What the tracker must know of the camera. focal in px; focal_baseline = f b, 0 for mono.
+  struct View {
+    int width = 0;
+    int height = 0;
+    double focal = 0;
+    double focal_baseline = 0;
+  };
+
+  /// Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<Tracker> create(const Config& config, const View& view, Arena& arena) noexcept;
+
+  /// Moves all targets on by dt seconds (>= 0) and says where they are expected.
+  [[nodiscard]] std::span<const Prediction> predict(double dt) noexcept;
+
+  /// Takes the detections of this frame in. More than kMaxDetections: the rest is not looked at.
+  void update(std::span<const Detection> detections) noexcept;
+
+  /// All targets, confirmed, coasting and tentative, in the order of their ids.
+  [[nodiscard]] std::span<const TrackReport> reports() const noexcept { return reports_.view(); }
+
+  /// Detections that found no room for a new target, since the start.
+  [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+
+ private:
+  struct Target {
+    std::uint32_t id;
+    TrackState state;
+    bool measured;
+    bool has_depth;
+    int hits;
+    int misses_in_a_row;
+    int frames;
+    double age_s;
+    double unseen_s;
+    double travelled_px;
+    double width;
+    double height;
+    double area;
+    double quality;
+    double first_x;
+    double first_y;
+    std::array<double, 3> colour;
+    ConstantVelocityFilter<2> image;
+    ConstantVelocityFilter<3> space;
+    Rect box;
+    FixedVector<Point, 48> hull;
+  };
+
+  [[nodiscard]] double cost(const Target& target, const Detection& detection) const noexcept;
+  void associate(std::span<const Detection> detections, bool confirmed) noexcept;
+  void measure(Target& target, const Detection& detection) noexcept;
+  void miss(Target& target) noexcept;
+  void start(const Detection& detection) noexcept;
+  [[nodiscard]] bool expired(const Target& target) const noexcept;
+  void report() noexcept;
+
+  Config config_;
+  View view_;
+  double dt_ = 0;
+  std::uint32_t next_id_ = 1;
+  std::uint64_t refused_ = 0;
+  BoundedVector<Target> targets_;
+  BoundedVector<Prediction> predictions_;
+  BoundedVector<TrackReport> reports_;
+  std::span<double> costs_;
+  std::span<int> detection_of_row_;
+  std::span<int> target_of_row_;
+  std::span<int> detection_of_column_;
+  std::span<unsigned char> detection_used_;
+  std::span<unsigned char> target_used_;
+  Assignment assignment_;
+};
+
+}  // namespace stereotrack

@@ -1,0 +1,104 @@
+#include "config/rules.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "config/schema.hpp"
+
+namespace stereotrack::config {
+namespace {
+
+std::string refused(const std::vector<Layer>& layers) {
+  try {
+    (void)load(layers);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(Rules, LookAtKeysThatExistAndHaveNamesOfTheirOwn) {
+  Configuration configuration;
+  std::set<std::string> keys;
+  for (const Key& key : keys_of(configuration)) keys.insert(key.name);
+  std::set<std::string_view> names;
+  for (const Rule& rule : rules()) {
+    EXPECT_TRUE(names.insert(rule.name).second) << rule.name;
+    EXPECT_FALSE(rule.keys.empty()) << rule.name;
+    for (const std::string_view key : rule.keys) EXPECT_TRUE(keys.contains(std::string(key))) << key;
+  }
+}
+
+TEST(Rules, DestinationNamedTwiceIsRefusedWhereItWasSet) {
+  const Layer file = text_layer("rig.toml", "[telemetry]\ndestinations = [\"a:1\", \"b:1\", \"a:1\"]\n");
+  EXPECT_EQ(refused({file}),
+            "rig.toml:2:16: telemetry.destinations: \"a:1\" stands there twice, its receiver would take every second "
+            "datagram for a replay: name it once");
+  EXPECT_EQ(refused({file, override_layer("telemetry.destinations=a:1")}), "");  // checked after all layers
+  EXPECT_EQ(refused({text_layer("rig.toml", "telemetry.rig_id = 3"), override_layer("telemetry.destinations=a:1,a:1")})
+                .find("--set telemetry.destinations=\"a:1,a:1\": telemetry.destinations: "),
+            0U);
+}
+
+TEST(Rules, BrokenRuleTellsWhereEachOfItsKeysCameFrom) {
+  const Layer file = text_layer("rig.toml", "[foreground]\nlow_sd = 12.0\nhigh_sd = 10.0\n");
+  EXPECT_EQ(refused({file}),
+            "rig.toml:2:10: foreground.low_sd: low_sd is above high_sd, a seed must also be a candidate: give low_sd "
+            "<= high_sd; foreground.high_sd is from rig.toml:3:11");
+  EXPECT_EQ(refused({override_layer("foreground.low_sd=6"), override_layer("foreground.high_sd=6")}), "");
+}
+
+TEST(Rules, TheLineStartsWhereTheUserSpokeNotAtADefault) {
+  EXPECT_EQ(refused({override_layer("foreground.high_sd=1")}),
+            "--set foreground.high_sd=1: foreground.high_sd: low_sd is above high_sd, a seed must also be a candidate: "
+            "give low_sd <= high_sd; foreground.low_sd is from the defaults");
+}
+
+TEST(Rules, LevelSetWithoutIterationsIsRefused) {
+  EXPECT_EQ(refused({override_layer("level_set.on=false"), override_layer("level_set.iterations=0")}), "");
+  EXPECT_EQ(refused({override_layer("level_set.on=true"), override_layer("level_set.iterations=1")}), "");
+  EXPECT_EQ(refused({override_layer("level_set.on=true"), override_layer("level_set.iterations=0")})
+                .find("--set level_set.iterations=0: level_set.iterations: the level set is on"),
+            0U);
+}
+
+TEST(Rules, MergingWhatWasSplitIsRefused) {
+  EXPECT_EQ(refused({override_layer("objects.merge_depth=0.2"), override_layer("objects.split_depth=0.2")}), "");
+  EXPECT_EQ(refused({override_layer("objects.merge_depth=0.21"), override_layer("objects.split_depth=0.2")})
+                .find("--set objects.merge_depth=0.21: objects.merge_depth: merge_depth is above split_depth"),
+            0U);
+}
+
+TEST(Metres, KeyInMetresNeedsAKnownUnit) {
+  double reach = 0;
+  double speed = 0;
+  double unit = 0;
+  const std::vector<Key> keys{key("unit", unit, 0, 9, "m per unit of T", "d"), key("reach", reach, 0, 9, "m", "d"),
+                              key("speed", speed, 0, 9, "m/s", "d")};
+  const auto refusal_of = [&](double unit_m) -> std::string {
+    Origins origins;
+    origins["speed"] = "rig.toml:1:9";
+    try {
+      check_metres(keys, origins, unit_m);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_EQ(refusal_of(0), "");  // nothing stated in metres
+  unit = 2;
+  EXPECT_EQ(refusal_of(0), "");  // the unit itself is no such key
+  speed = 3;
+  EXPECT_EQ(refusal_of(0),
+            "rig.toml:1:9: speed: it is in metres, and the calibration's unit is not known: set calibration.unit_m to "
+            "the metres in one unit of T");
+  EXPECT_EQ(refusal_of(0.0254), "");
+  reach = 1;
+  EXPECT_EQ(refusal_of(0).find("default: reach: "), 0U);
+}
+
+}  // namespace
+}  // namespace stereotrack::config
