@@ -118,15 +118,15 @@ std::vector<Key> keys_of(Configuration& c) {
           {{"stereo", ShadowMethod::kStereo}, {"chroma", ShadowMethod::kChroma}, {"off", ShadowMethod::kOff}},
           "Shadow test: the background's own disparity first, the document's chroma test alone (3.20-3.23), or none."),
       key("shadow.darkest_percent", p.shadow.test.darkest_percent, 1, 99, "%",
-          "Darkest light of a shadow, in percent of the lit background."),
+          "Darkest light of a shadow, in percent of the lit background: lower removes deeper shadows, and dark objects."),
       key("shadow.chroma_tolerance", p.shadow.test.chroma_tolerance, 0, 255, "grey levels",
           "How much a shadow may change Cb and Cr."),
       key("shadow.texture_tolerance", p.shadow.test.texture_tolerance, 0, 255, "grey levels",
           "How much a shadow may change the background's own texture."),
       key("shadow.disparity_px", p.shadow.test.disparity_px, 0, 16, "px",
           "Disparities this near count as the background's own."),
-      key("shadow.photometric_alone", p.shadow.test.photometric_alone,
-          "Removes shadows by their look where stereo says nothing: fewer shadows, and now and then part of an object."),
+      key("shadow.own_depth_px", p.shadow.own_depth_px, 0, 16, "px",
+          "A region whose disparity is the background's own within this is light or a mark, not an object; 0: off."),
 
       key("objects.min_area_px", p.objects.min_area_px, 1, 1000000, "px", "Smaller objects are rejected."),
       key("objects.merge_gap", p.objects.merge_gap, 0, 2, "size",
@@ -164,6 +164,8 @@ std::vector<Key> keys_of(Configuration& c) {
           "What that noise grows by with the size of the box."),
       key("track.travel_px", p.track.travel_px, 0, 100, "px",
           "Way in the picture before a target is confirmed: tells motion from flicker."),
+      key("track.straight_part", p.track.straight_part, 0, 1, "path",
+          "Part of its path that this way must be: flicker jumps to and fro."),
   };
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "pipeline/motion/chroma_test.hpp"
 #include "pipeline/motion/difference.hpp"
@@ -18,6 +19,13 @@ namespace {
 constexpr int kMaxRuns = 65536;
 // A blob of which the shadow test leaves less than this part was a shadow.
 constexpr int kShadowRestPercent = 25;
+// A region is a ghost, light or a mark if at least this part of its known disparities says so, and those are at
+// least kEvidencePercent of its pixels.
+constexpr int kVerdictPercent = 70;
+constexpr int kEvidencePercent = 15;
+// The background's disparity is renewed this much slower once it is complete.
+constexpr int kLaterPasses = 10;
+constexpr int kWidestGap = 64;  // [px]
 // Room around a predicted disparity, in standard deviations and as a fraction, for targets that accelerate.
 constexpr double kRangeSd = 3;
 constexpr double kRangeFraction = 0.25;
@@ -29,6 +37,24 @@ void fill(ImageView<std::uint8_t> picture, std::uint8_t value) noexcept {
 template <class T>
 void fill(ImageView<T> picture, const Rect& part, T value) noexcept {
   for (int y = part.top; y < part.bottom(); ++y) std::fill_n(picture.row(y) + part.left, part.width, value);
+}
+
+// Short stretches of a row without disparity, between ends that agree, take the straight line between them: a
+// background is mostly made of planes.
+void bridge_gaps(std::uint16_t* row, int width) noexcept {
+  int last = -1;
+  for (int x = 0; x < width; ++x) {
+    if (row[x] == kNoDisparity) continue;
+    const int gap = x - last;
+    if (last >= 0 && gap > 1 && gap <= kWidestGap) {
+      const int from = row[last];
+      const int to = row[x];
+      if (std::abs(to - from) <= std::max(2 * kDisparityScale, from / 10)) {
+        for (int u = last + 1; u < x; ++u) row[u] = static_cast<std::uint16_t>(from + (to - from) * (u - last) / gap);
+      }
+    }
+    last = x;
+  }
 }
 
 // Takes what create() of a stage gave; remembers the first fault.
@@ -161,7 +187,7 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
     right_.background_canvas = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
     right_moving_ = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
     canvas_background_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
-    canvas_known_ = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
+    if (!canvas_background_.empty()) fill(canvas_background_, {0, 0, canvas.width_left, canvas.height}, kNoDisparity);
     old_disparity_ = arena.image<std::uint16_t>(width, height);
   }
   left_.canvas = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
@@ -196,6 +222,8 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   const Detector::Input objects{.blobs = blobs_.blobs,
                                 .labels = blobs_.labels,
                                 .disparity = disparity_,
+                                .background_disparity = old_disparity_,
+                                .own_depth_px = config_.shadow.method == ShadowMethod::kStereo ? config_.shadow.own_depth_px : 0,
                                 .y = left_.y,
                                 .cb = left_.cb,
                                 .cr = left_.cr,
@@ -295,6 +323,7 @@ void Pipeline::foreground_from_model() noexcept {
   }
   rectifier_->rectify(background_left_->luma(), View::kLeft, left_.background_canvas);
   rectifier_->rectify(background_right_->luma(), View::kRight, right_.background_canvas);
+  if (frames_ > 1 && config_.shadow.method == ShadowMethod::kStereo) renew_background_disparity();
 }
 
 void Pipeline::refine_blobs() noexcept {
@@ -377,27 +406,21 @@ void Pipeline::run_matcher(ImageView<const std::uint8_t> left, ImageView<const s
   }
 }
 
-void Pipeline::match_background(const Blob& blob, const Rect& roi) noexcept {
-  const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
-  // The background hardly changes: each place is matched once, when something first hides it.
-  for (int y = roi.top; y < roi.bottom(); ++y) {
-    for (int x = roi.left; x < roi.right(); ++x) {
-      if (canvas_known_.at(x, y) != 0) wanted_.at(x, y) = 0;
-    }
+// The background hardly changes and matching all of it costs much, so each frame renews a strip of rows: the whole
+// picture once while the background is learnt, then again and again, ten times slower.
+void Pipeline::renew_background_disparity() noexcept {
+  const int height = canvas_background_.height;
+  const int pass = std::max(config_.background.frames, 1) * (renewed_rows_ < height ? 1 : kLaterPasses);
+  const int rows = std::min((height + pass - 1) / pass, height);
+  const int top = renewed_rows_ % height;
+  const Rect strip{0, top, canvas_background_.width, std::min(rows, height - top)};
+  for (int y = strip.top; y < strip.bottom(); ++y) {
+    std::copy_n(rectifier_->mask(View::kLeft).row(y), strip.width, wanted_.row(y));
   }
-  run_matcher(left_.background_canvas, right_.background_canvas, roi, {0, full_range_}, canvas_background_);
-  for (int y = roi.top; y < roi.bottom(); ++y) {
-    for (int x = roi.left; x < roi.right(); ++x) {
-      if (wanted_.at(x, y) != 0) canvas_known_.at(x, y) = 1;
-    }
-  }
-  for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
-    const Rectifier::PointF p = place.at(x, y);
-    const int u = static_cast<int>(std::floor(p.x + 0.5F));
-    const int v = static_cast<int>(std::floor(p.y + 0.5F));
-    const bool known = p.valid() && canvas_known_.contains(u, v) && canvas_known_.at(u, v) != 0;
-    old_disparity_.at(x, y) = known ? canvas_background_.at(u, v) : kNoDisparity;
-  });
+  fill(canvas_background_, strip, kNoDisparity);
+  run_matcher(left_.background_canvas, right_.background_canvas, strip, {0, full_range_}, canvas_background_);
+  for (int y = strip.top; y < strip.bottom(); ++y) bridge_gaps(canvas_background_.row(y), strip.width);
+  renewed_rows_ += strip.height;
 }
 
 void Pipeline::match_blob(const Blob& blob) noexcept {
@@ -414,8 +437,8 @@ void Pipeline::match_blob(const Blob& blob) noexcept {
     const int v = static_cast<int>(std::floor(p.y + 0.5F));
     const bool known = p.valid() && canvas_disparity_.contains(u, v);
     disparity_.at(x, y) = known ? canvas_disparity_.at(u, v) : kNoDisparity;
+    if (background_right_) old_disparity_.at(x, y) = known ? canvas_background_.at(u, v) : kNoDisparity;
   });
-  if (config_.shadow.method == ShadowMethod::kStereo && background_right_) match_background(blob, roi);
 }
 
 void Pipeline::match_dense() noexcept {
@@ -433,36 +456,62 @@ void Pipeline::find_disparity() noexcept {
   }
 }
 
+ShadowTest::Input Pipeline::shadow_input() const noexcept {
+  return {.y = left_.smooth_y,
+          .cb = left_.smooth_cb,
+          .cr = left_.smooth_cr,
+          .y_background = background_left_->luma(),
+          .cb_background = background_left_->blue(),
+          .cr_background = background_left_->red(),
+          .disparity = disparity_,
+          .disparity_background = old_disparity_};
+}
+
+// Regions that stereo knows to be no object, as a whole: light and marks on the background's own surface, and
+// ghosts, of which the background is told.
+void Pipeline::reject_background() noexcept {
+  if (disparity_.empty()) return;
+  const ShadowTest::Input in = shadow_input();
+  for (Blob& blob : blobs_.blobs) {
+    ShadowTest::Evidence sum;
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { shadow_test_->weigh(in, x, y, sum); });
+    const int known = sum.near + sum.own + sum.behind;
+    if (known * 100 < blob.area * kEvidencePercent) continue;
+    const bool ghost = sum.behind * 100 >= known * kVerdictPercent;
+    const bool surface = (sum.own + sum.behind) * 100 >= known * kVerdictPercent;
+    if (!surface) continue;
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
+      left_.mask.at(x, y) = 0;
+      if (ghost) moving_.at(x, y) = AdaptiveBackground::kForget;
+    });
+  }
+}
+
 void Pipeline::remove_shadows() noexcept {
   for (int y = 0; y < setup_.height; ++y) {
     const std::uint16_t* label = blobs_.labels.row(y);
     std::uint8_t* mask = left_.mask.row(y);
     for (int x = 0; x < setup_.width; ++x) mask[x] = label[x] != 0 ? 255 : 0;
   }
-  std::uint32_t cleared = 0;
+  if (config_.shadow.method == ShadowMethod::kOff) return;
   if (config_.shadow.method == ShadowMethod::kChroma) {
     if (!setup_.colour) return;
-    cleared = mean_cb_ ? ChromaTest::run(left_.cb, left_.cr, mean_cb_->mean(), mean_cr_->mean(), left_.mask)
-                       : ChromaTest::run(left_.smooth_cb, left_.smooth_cr, background_left_->blue(),
-                                         background_left_->red(), left_.mask);
-  } else if (config_.shadow.method == ShadowMethod::kStereo && background_left_) {
-    cleared = shadow_test_->run({.y = left_.smooth_y,
-                                 .cb = left_.smooth_cb,
-                                 .cr = left_.smooth_cr,
-                                 .y_background = background_left_->luma(),
-                                 .cb_background = background_left_->blue(),
-                                 .cr_background = background_left_->red(),
-                                 .disparity = disparity_,
-                                 .disparity_background = old_disparity_},
-                                left_.mask);
+    if (mean_cb_) {
+      (void)ChromaTest::run(left_.cb, left_.cr, mean_cb_->mean(), mean_cr_->mean(), left_.mask);
+    } else {
+      (void)ChromaTest::run(left_.smooth_cb, left_.smooth_cr, background_left_->blue(), background_left_->red(),
+                            left_.mask);
+    }
+  } else if (background_left_) {
+    reject_background();
+    (void)shadow_test_->run(shadow_input(), left_.mask);
   }
-  if (cleared == 0) return;
   for (const Blob& blob : blobs_.blobs) {
     std::int32_t rest = 0;
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { rest += left_.mask.at(x, y) != 0 ? 1 : 0; });
     if (rest * 100 >= blob.area * kShadowRestPercent) continue;
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { left_.mask.at(x, y) = 0; });
-    ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];
+    if (blob.area > 0) ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];
   }
   (void)opening_->run(left_.mask, scratch_);
   if (const auto blobs = blob_extractor_->run(scratch_); blobs.has_value()) blobs_ = *blobs;
@@ -499,7 +548,8 @@ void Pipeline::learn_background() noexcept {
   if (light_change_) {
     background_left_->restart();
     if (background_right_) background_right_->restart();
-    if (rectifier_) fill(canvas_known_, 0);
+    renewed_rows_ = 0;
+    if (rectifier_) fill(canvas_background_, {0, 0, canvas_background_.width, canvas_background_.height}, kNoDisparity);
   }
   background_left_->learn(left_planes(), moving_);
   if (background_right_) background_right_->learn({right_.smooth_y, {}, {}}, right_.mask);

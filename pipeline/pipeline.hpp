@@ -109,7 +109,9 @@ class Pipeline {
   void find_disparity() noexcept;
   void match_dense() noexcept;
   void match_blob(const Blob& blob) noexcept;
-  void match_background(const Blob& blob, const Rect& roi) noexcept;
+  void renew_background_disparity() noexcept;
+  void reject_background() noexcept;
+  [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;
   void match_small(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
@@ -134,14 +136,14 @@ class Pipeline {
   Planes left_;
   Planes right_;
   ImageView<std::uint8_t> scratch_;
-  ImageView<std::uint8_t> moving_;            ///< foreground before shadows are removed
+  ImageView<std::uint8_t> moving_;            ///< what learn() of the left background is told
   ImageView<std::uint16_t> disparity_;        ///< raw left picture [1/16 px]
   ImageView<std::uint16_t> old_disparity_;    ///< the background's, raw left picture
   ImageView<std::uint8_t> wanted_;            ///< canvas: pixels to be matched
   ImageView<std::uint16_t> canvas_labels_;
   ImageView<std::uint16_t> canvas_disparity_;
-  ImageView<std::uint16_t> canvas_background_;  ///< background's disparity, filled as it is needed
-  ImageView<std::uint8_t> canvas_known_;        ///< where canvas_background_ has been computed
+  ImageView<std::uint16_t> canvas_background_;  ///< background's disparity, renewed a strip of rows a frame
+  int renewed_rows_ = 0;                        ///< of canvas_background_, since the background began
   ImageView<std::uint8_t> right_moving_;        ///< right canvas: foreground of the right view
 
   Equalise equalise_left_{{}};

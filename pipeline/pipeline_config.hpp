@@ -64,6 +64,7 @@ struct DisparityConfig {
 struct ShadowConfig {
   ShadowMethod method = ShadowMethod::kStereo;
   ShadowTest::Config test;
+  double own_depth_px = 0.6;  ///< a region this near to the background's own disparity is none, 0..16 [px]
 };
 
 /// What every stage is told. The defaults are the robust preset.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <new>
 #include <span>
@@ -33,6 +34,10 @@ class Arena {
   template <class T>
   [[nodiscard]] std::span<T> array(std::size_t count) noexcept {
     static_assert(std::is_default_constructible_v<T> && std::is_trivially_destructible_v<T>);
+    if (count > SIZE_MAX / sizeof(T)) {
+      failed_ = true;
+      return {};
+    }
     void* memory = take(count * sizeof(T));
     if (memory == nullptr) return {};
     T* first = static_cast<T*>(memory);
@@ -43,6 +48,10 @@ class Arena {
   /// A zeroed picture whose rows start on kAlignment and are followed by at least one vector of padding.
   template <class T>
   [[nodiscard]] ImageView<T> image(int width, int height) noexcept {
+    if (width < 0 || height < 0) {
+      failed_ = true;
+      return {};
+    }
     constexpr std::size_t kPerLine = kAlignment / sizeof(T) > 0 ? kAlignment / sizeof(T) : 1;
     const std::size_t stride = ((static_cast<std::size_t>(width) + kPerLine - 1) / kPerLine + 1) * kPerLine;
     std::span<T> pixels = array<T>(stride * static_cast<std::size_t>(height));

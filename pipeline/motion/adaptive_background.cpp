@@ -163,7 +163,7 @@ void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8
       std::uint16_t& age = age_.at(x, y);
       std::uint16_t& candidate_age = candidate_age_.at(x, y);
       foreground_.at(x, y) = seen_ > 0 ? mask.at(x, y) : std::uint8_t{0};
-      if (age == 0) {
+      if (age == 0 || mask.at(x, y) == kForget) {
         each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
           channel.mean.at(x, y) = static_cast<std::uint16_t>(plane.at(x, y) << 8);
           channel.deviation.at(x, y) = kPriorDeviation;

@@ -53,7 +53,11 @@ class AdaptiveBackground {
   /// the first learn(). Also estimates the light's gain.
   void distance(const Planes& picture, ImageView<std::uint8_t> out) noexcept;
 
-  /// Learns from the picture that distance() saw; mask: 255 = foreground, not to be learnt as background.
+  /// Marks in the mask of learn().
+  static constexpr std::uint8_t kForeground = 255;  ///< not to be learnt as background
+  static constexpr std::uint8_t kForget = 1;        ///< the background here is wrong: start anew with this look
+
+  /// Learns from the picture that distance() saw. mask: 0 where it is background, else one of the marks above.
   void learn(const Planes& picture, ImageView<const std::uint8_t> mask) noexcept;
 
   /// Forgets everything but the latest look: the next learn() starts a new mean.

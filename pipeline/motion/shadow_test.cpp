@@ -10,6 +10,7 @@ namespace stereotrack {
 namespace {
 
 constexpr int kReach = 2;
+constexpr int kBrightestPercent = 97;  // above, the light is the same
 
 template <class Fn>
 void for_each_neighbour(int x, int y, int width, int height, Fn&& fn) noexcept {
@@ -28,7 +29,7 @@ Result<ShadowTest> ShadowTest::create(const Config& config, int width, int heigh
   if (width < 1 || height < 1) return fail(Fault::kBadSize);
   ShadowTest self;
   self.config_ = config;
-  self.evidence_ = arena.image<std::uint8_t>(width, height);
+  self.verdicts_ = arena.image<std::uint8_t>(width, height);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
 }
@@ -37,16 +38,16 @@ bool ShadowTest::looks_shadowed(const Input& in, int x, int y) const noexcept {
   int now = 0;
   int before = 0;
   int count = 0;
-  for_each_neighbour(x, y, evidence_.width, evidence_.height, [&](int u, int v) {
+  for_each_neighbour(x, y, verdicts_.width, verdicts_.height, [&](int u, int v) {
     now += in.y.at(u, v);
     before += in.y_background.at(u, v);
     ++count;
   });
   if (before == 0) return false;
   const int ratio = static_cast<int>(static_cast<std::int64_t>(now) * 256 / before);
-  if (ratio * 100 < config_.darkest_percent * 256) return false;
+  if (ratio * 100 < config_.darkest_percent * 256 || ratio * 100 >= kBrightestPercent * 256) return false;
   int residual = 0;
-  for_each_neighbour(x, y, evidence_.width, evidence_.height, [&](int u, int v) {
+  for_each_neighbour(x, y, verdicts_.width, verdicts_.height, [&](int u, int v) {
     residual += std::abs(in.y.at(u, v) * 256 - in.y_background.at(u, v) * ratio);
   });
   if (residual > (config_.texture_tolerance * 256) * count) return false;
@@ -58,25 +59,39 @@ bool ShadowTest::looks_shadowed(const Input& in, int x, int y) const noexcept {
          chroma_kept(in.cr.at(x, y), in.cr_background.at(x, y));
 }
 
-ShadowTest::Evidence ShadowTest::judge(const Input& in, int x, int y) const noexcept {
-  const bool darker = in.y.at(x, y) * 100 < in.y_background.at(x, y) * 95;
-  bool stereo_known = false;
-  bool stereo_same = false;
-  if (!in.disparity.empty()) {
-    const int now = in.disparity.at(x, y);
-    const int before = in.disparity_background.at(x, y);
-    stereo_known = now != kNoDisparity && before != kNoDisparity;
-    stereo_same = stereo_known && std::abs(now - before) <= static_cast<int>(config_.disparity_px * kDisparityScale);
+ShadowTest::Depth ShadowTest::depth_of(const Input& in, int x, int y) const noexcept {
+  if (in.disparity.empty() || in.disparity_background.empty()) return Depth::kUnknown;
+  const int now = in.disparity.at(x, y);
+  const int before = in.disparity_background.at(x, y);
+  if (now == kNoDisparity || before == kNoDisparity) return Depth::kUnknown;
+  const int tolerance = static_cast<int>(config_.disparity_px * kDisparityScale);
+  if (now - before > tolerance) return Depth::kNear;
+  return before - now > tolerance ? Depth::kBehind : Depth::kOwn;
+}
+
+void ShadowTest::weigh(const Input& in, int x, int y, Evidence& sum) const noexcept {
+  switch (depth_of(in, x, y)) {
+    case Depth::kUnknown: ++sum.unknown; break;
+    case Depth::kNear: ++sum.near; break;
+    case Depth::kOwn: ++sum.own; break;
+    case Depth::kBehind: ++sum.behind; break;
   }
-  if (stereo_known && !stereo_same) return kObject;
-  if (stereo_same) return looks_shadowed(in, x, y) ? kShadow : kObject;
-  return config_.photometric_alone && darker && looks_shadowed(in, x, y) ? kShadow : kObject;
+}
+
+ShadowTest::Verdict ShadowTest::judge(const Input& in, int x, int y) const noexcept {
+  switch (depth_of(in, x, y)) {
+    case Depth::kNear: return kObject;
+    case Depth::kBehind: return kBackground;
+    case Depth::kOwn:
+    case Depth::kUnknown: break;
+  }
+  return looks_shadowed(in, x, y) ? kBackground : kObject;
 }
 
 std::uint32_t ShadowTest::run(const Input& in, ImageView<std::uint8_t> mask) noexcept {
   for (int y = 0; y < mask.height; ++y) {
     for (int x = 0; x < mask.width; ++x) {
-      evidence_.at(x, y) = mask.at(x, y) == 0 ? kOutside : judge(in, x, y);
+      verdicts_.at(x, y) = mask.at(x, y) == 0 ? kOutside : judge(in, x, y);
     }
   }
   std::uint32_t cleared = 0;
@@ -86,8 +101,8 @@ std::uint32_t ShadowTest::run(const Input& in, ImageView<std::uint8_t> mask) noe
       int shadow = 0;
       int object = 0;
       for_each_neighbour(x, y, mask.width, mask.height, [&](int u, int v) {
-        shadow += evidence_.at(u, v) == kShadow ? 1 : 0;
-        object += evidence_.at(u, v) == kObject ? 1 : 0;
+        shadow += verdicts_.at(u, v) == kBackground ? 1 : 0;
+        object += verdicts_.at(u, v) == kObject ? 1 : 0;
       });
       if (shadow > object) {
         mask.at(x, y) = 0;

@@ -8,30 +8,38 @@
 
 namespace stereotrack {
 
-/// Shadow and light of the robust preset: foreground pixels that are the background, only lit differently.
+/// Shadow, light and ghosts of the robust preset: foreground pixels that are the background after all.
 ///
-/// Photometric evidence, per pixel. With r = Y / Y_background, the ratio of the lights:
-///     0.05 <= r < 0.95                        darker, not black (shadow only; lights are left to stereo)
+/// Stereo evidence first, where the present disparity d and the background's own d_b are both known:
+///     d - d_b > disparity_px       nearer than the background: object, whatever it looks like
+///     d_b - d > disparity_px       behind it, where nothing can be: the background holds something that has
+///                                  left, a ghost
+///     else                         the background's own surface: shadow if it looks so, else undecided
+/// Photometric evidence, where stereo says nothing or "own surface". With r the ratio of the lights over 5x5,
+/// r = sum Y / sum Y_background:
+///     darkest_percent / 100 <= r < 0.97                      darker, not black
 ///     |C - 128 - r (C_background - 128)| <= chroma tolerance, C in {Cb, Cr}
-///     mean over 5x5 of |Y - r5 Y_background| <= texture tolerance + noise,  r5 = sum Y / sum Y_background
+///     mean over 5x5 of |Y - r Y_background| <= texture tolerance
 /// the last says that the background's own texture is still there, only scaled.
 ///
-/// Stereo evidence, where both disparities are known: the present disparity is the background's own within
-/// disparity_px. Stereo knows better: a pixel whose disparity differs is object, whatever it looks like; a
-/// pixel with the background's disparity and texture is shadow or light. Without disparity the photometric test
-/// decides, if photometric_alone.
-///
-/// The decision is then a majority vote over 5x5 foreground pixels, so that no object is riddled.
+/// The decision is a majority vote over the 5x5 foreground pixels around, so that no object is riddled.
 /// In: planes of one size; empty cb, cr for grey; empty disparities for mono. O(foreground x 25).
 /// One instance a thread.
 class ShadowTest {
  public:
   struct Config {
-    int darkest_percent = 5;        ///< smallest ratio of a shadow [%], 1..99
-    int chroma_tolerance = 8;       ///< [grey levels], 0..255
-    int texture_tolerance = 5;      ///< [grey levels], 0..255
-    double disparity_px = 1.0;      ///< disparities this near are the same [px], 0..16
-    bool photometric_alone = false; ///< remove on appearance alone where stereo says nothing
+    int darkest_percent = 40;   ///< smallest ratio of a shadow [%], 1..99
+    int chroma_tolerance = 8;   ///< [grey levels], 0..255
+    int texture_tolerance = 5;  ///< [grey levels], 0..255
+    double disparity_px = 1.0;  ///< disparities this near are the same [px], 0..16
+  };
+
+  /// What the foreground of a region is made of [px].
+  struct Evidence {
+    int near = 0;     ///< nearer than the background
+    int own = 0;      ///< at the background's own disparity
+    int behind = 0;   ///< behind it
+    int unknown = 0;  ///< no disparity, then or now
   };
 
   struct Input {
@@ -51,13 +59,18 @@ class ShadowTest {
   /// Clears the pixels of `mask` (255 = foreground) that are shadow or light; returns how many.
   std::uint32_t run(const Input& in, ImageView<std::uint8_t> mask) noexcept;
 
+  /// Stereo evidence at one pixel, added to `sum`.
+  void weigh(const Input& in, int x, int y, Evidence& sum) const noexcept;
+
  private:
-  enum Evidence : std::uint8_t { kOutside = 0, kObject = 1, kShadow = 2 };
+  enum Verdict : std::uint8_t { kOutside = 0, kObject = 1, kBackground = 2 };
+  enum class Depth : std::uint8_t { kUnknown, kNear, kOwn, kBehind };
+  [[nodiscard]] Depth depth_of(const Input& in, int x, int y) const noexcept;
   [[nodiscard]] bool looks_shadowed(const Input& in, int x, int y) const noexcept;
-  [[nodiscard]] Evidence judge(const Input& in, int x, int y) const noexcept;
+  [[nodiscard]] Verdict judge(const Input& in, int x, int y) const noexcept;
 
   Config config_;
-  ImageView<std::uint8_t> evidence_;
+  ImageView<std::uint8_t> verdicts_;
 };
 
 }  // namespace stereotrack

@@ -16,6 +16,8 @@ constexpr int kBin = kDisparityScale / 2;
 constexpr std::size_t kBins = 0x10000 / kBin;
 // A claim counts if at least this part of the smaller of target and blob is common to both.
 constexpr double kClaimPart = 0.25;
+// Targets of which the smaller lies inside the larger by this much are taken for one object.
+constexpr double kNestedPart = 0.7;
 // A depth that does not fit counts against a pixel at most this much.
 constexpr double kMostDepthCost = 16.0;
 // A region's disparity is never known better than this, whatever the number of pixels: errors of neighbours go
@@ -85,7 +87,22 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
     layer.disparity = target.disparity;
     layer.disparity_sd = target.disparity_sd + config_.match_noise_px + 0.25 * config_.split_depth * target.disparity;
     layer.claim = static_cast<int>(k);
-    (void)layers_.push(layer);
+    layer.fit = overlap(expected, blob.box);
+    // Two targets at one place and depth are one object seen twice: the one that fits the blob better claims it.
+    bool rival = false;
+    for (Layer& other : layers_) {
+      const Rect& box = in.predictions[static_cast<std::size_t>(other.claim)].box;
+      const auto lesser = static_cast<double>(std::min(box.area(), target.box.area()));
+      if (static_cast<double>(intersect(box, target.box).area()) < kNestedPart * lesser) continue;
+      if (other.has_depth && layer.has_depth &&
+          std::abs(other.disparity - layer.disparity) > other.disparity_sd + layer.disparity_sd) {
+        continue;
+      }
+      rival = true;
+      if (layer.fit > other.fit) other = layer;
+      break;
+    }
+    if (!rival) (void)layers_.push(layer);
   }
 }
 
@@ -354,6 +371,21 @@ std::span<Detector::Candidate> Detector::segment(const Input& in) noexcept {
   return {candidates_.begin(), candidates_.size()};
 }
 
+// Median of (its disparity - the background's) over its pixels; a third of them must tell.
+bool Detector::on_own_surface(const Input& in, const Candidate& candidate) noexcept {
+  if (in.background_disparity.empty() || !(in.own_depth_px > 0) || !candidate.has_depth) return false;
+  int known = 0;
+  int near = 0;
+  const double limit = candidate.disparity - in.own_depth_px;
+  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
+    const std::uint16_t background = in.background_disparity.at(x, y);
+    if (background == kNoDisparity) return;
+    ++known;
+    if (background / static_cast<double>(kDisparityScale) < limit) ++near;
+  });
+  return known * 3 >= candidate.area && near * 2 < known;
+}
+
 bool Detector::describe(const Input& in, const Candidate& candidate, Detection& out) noexcept {
   out = Detection{};
   out.box = candidate.box;
@@ -424,6 +456,10 @@ std::span<const Detection> Detector::conclude(const Input& in) noexcept {
     }
     if (candidate.has_depth && candidate.scatter > std::max(config_.most_scatter * candidate.disparity, 1.5) && !known) {
       reject(Rejection::kInconsistent);
+      continue;
+    }
+    if (on_own_surface(in, candidate)) {
+      reject(Rejection::kOwnSurface);
       continue;
     }
     Detection detection;

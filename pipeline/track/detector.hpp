@@ -21,12 +21,13 @@ enum class Rejection : std::uint8_t {
   kNoTexture,     ///< stereo source, but nothing in it could be matched
   kInconsistent,  ///< its disparities scatter too much to be one object
   kShadow,        ///< the shadow test left nothing of it
+  kOwnSurface,    ///< its disparity is the background's own: light, a shadow or a mark
   kNoRoom,        ///< more candidates than the detector holds
 };
-inline constexpr std::size_t kRejections = 5;
+inline constexpr std::size_t kRejections = 6;
 [[nodiscard]] constexpr const char* to_string(Rejection why) noexcept {
   constexpr std::array<const char*, kRejections> kNames{"small", "no_texture", "inconsistent_depth", "shadow",
-                                                        "no_room"};
+                                                        "own_surface", "no_room"};
   return kNames[static_cast<std::size_t>(why)];
 }
 using RejectionCounts = std::array<std::uint32_t, kRejections>;
@@ -64,6 +65,8 @@ class Detector {
     std::span<const Blob> blobs;
     ImageView<std::uint16_t> labels;  ///< of the blobs; receives label i + 1 for detection i, 0 elsewhere
     ImageView<const std::uint16_t> disparity;  ///< 1/16 px in the raw left picture, empty for mono
+    ImageView<const std::uint16_t> background_disparity;  ///< the background's own, where known; may be empty
+    double own_depth_px = 0;  ///< objects this near to the background's own disparity are none [px], 0 = off
     ImageView<const std::uint8_t> y;
     ImageView<const std::uint8_t> cb;  ///< empty for grey
     ImageView<const std::uint8_t> cr;
@@ -103,6 +106,7 @@ class Detector {
   struct Layer {
     double x, y, half_width, half_height;
     double disparity, disparity_sd;
+    double fit;
     bool has_place, has_depth;
     int claim;
   };
@@ -117,6 +121,7 @@ class Detector {
   void merge(const Input& in) noexcept;
   [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
   [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept;
+  [[nodiscard]] bool on_own_surface(const Input& in, const Candidate& candidate) noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
   void reject(Rejection why) noexcept { ++rejections_[static_cast<std::size_t>(why)]; }
 

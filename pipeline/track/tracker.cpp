@@ -18,6 +18,8 @@ constexpr double kLumaSd = 14.0;
 constexpr double kChromaSd = 6.0;
 // Smoothing of size and colour: a partly hidden target must not be learnt at once.
 constexpr double kAppearanceRate = 0.2;
+// A target that comes straight on hardly moves in the picture: this change of distance shows it.
+constexpr double kApproachPart = 0.05;
 
 double square(double value) noexcept { return value * value; }
 
@@ -170,12 +172,13 @@ void Tracker::measure(Target& target, const Detection& detection) noexcept {
   target.area += (detection.area - target.area) * rate;
   for (std::size_t i = 0; i < 3; ++i) target.colour[i] += (detection.colour[i] - target.colour[i]) * rate;
   target.quality += (0.5 + 0.5 * detection.strength - target.quality) * 0.2;
-  const double way = std::sqrt(square(z.x() - target.first_x) + square(z.y() - target.first_y));
-  target.travelled_px = std::max(target.travelled_px, way);
+  target.path_px += std::sqrt(square(z.x() - target.last_x) + square(z.y() - target.last_y));
+  target.way_px = std::sqrt(square(z.x() - target.first_x) + square(z.y() - target.first_y));
+  target.last_x = z.x();
+  target.last_y = z.y();
   target.box = detection.box;
   target.hull = detection.hull;
-  if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits &&
-      target.travelled_px >= config_.travel_px) {
+  if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits && got_somewhere(target)) {
     target.state = TrackState::kConfirmed;
   } else if (target.state == TrackState::kCoasting) {
     target.state = TrackState::kConfirmed;
@@ -205,6 +208,9 @@ void Tracker::start(const Detection& detection) noexcept {
   target.area = detection.area;
   target.first_x = detection.centre_x();
   target.first_y = detection.centre_y();
+  target.last_x = target.first_x;
+  target.last_y = target.first_y;
+  target.first_distance = detection.has_depth ? detection.position.z() : 0;
   target.quality = 0.25 + 0.25 * detection.strength;
   for (std::size_t i = 0; i < 3; ++i) target.colour[i] = detection.colour[i];
   target.box = detection.box;
@@ -224,6 +230,12 @@ void Tracker::start(const Detection& detection) noexcept {
   } else {
     ++refused_;
   }
+}
+
+bool Tracker::got_somewhere(const Target& target) const noexcept {
+  if (target.way_px >= config_.travel_px && target.way_px >= config_.straight_part * target.path_px) return true;
+  if (!target.has_depth || target.first_distance <= 0) return false;
+  return std::abs(target.space.position().z() - target.first_distance) >= kApproachPart * target.first_distance;
 }
 
 bool Tracker::expired(const Target& target) const noexcept {

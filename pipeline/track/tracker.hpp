@@ -24,8 +24,9 @@ namespace stereotrack {
 /// solved as one assignment problem; confirmed targets first, tentative ones among what is left. The gate has
 /// room for one missing frame: the distance covered in one step counts as uncertainty along the motion.
 ///
-/// Life: a detection without a target starts a tentative one. confirm_hits detections within
-/// confirm_hits + 2 frames confirm it; tentative_misses frames without one remove it. A confirmed target
+/// Life: a detection without a target starts a tentative one. It is confirmed by confirm_hits detections if it
+/// has got somewhere meanwhile: at least travel_px in the picture and straight_part of the path it took (flicker
+/// jumps to and fro), or a twentieth of its distance. tentative_misses frames in a row without detection remove it. A confirmed target
 /// without detection coasts on its prediction for coast_s, or until it left the picture.
 ///
 /// One thread. O(tracks x detections), no allocation after create().
@@ -44,6 +45,7 @@ class Tracker {
     double centre_noise_px = 0.7;      ///< noise of a box centre [px], 0.05..20
     double centre_noise_size = 0.05;   ///< and what it grows by with the box's size [1], 0..1
     double travel_px = 3.0;            ///< way in the picture that tells a target from flicker [px], 0..100
+    double straight_part = 0.4;        ///< part of its path that this way must be, 0..1
   };
 
   /// What the tracker must know of the camera. focal in px; focal_baseline = f b, 0 for mono.
@@ -80,7 +82,11 @@ class Tracker {
     int frames;
     double age_s;
     double unseen_s;
-    double travelled_px;
+    double way_px;      // net, from where it began
+    double path_px;     // along the way
+    double first_distance;
+    double last_x;
+    double last_y;
     double width;
     double height;
     double area;
@@ -99,6 +105,7 @@ class Tracker {
   void measure(Target& target, const Detection& detection) noexcept;
   void miss(Target& target) noexcept;
   void start(const Detection& detection) noexcept;
+  [[nodiscard]] bool got_somewhere(const Target& target) const noexcept;
   [[nodiscard]] bool expired(const Target& target) const noexcept;
   void report() noexcept;
 

@@ -21,11 +21,11 @@ const SceneEntry& find_scene(const std::string& name) {
     if (entry.name == name) return entry;
     known += (known.empty() ? "" : ", ") + std::string(entry.name);
   }
-  throw std::runtime_error("synthetic:" + name + ": no such scene; there is " + known);
+  throw SceneError("synthetic:" + name + ": no such scene; there is " + known);
 }
 
 void check(const std::string& name, const SyntheticOptions& o) {
-  const auto refuse = [&](const std::string& what) { throw std::runtime_error("synthetic:" + name + ": " + what); };
+  const auto refuse = [&](const std::string& what) { throw SceneError("synthetic:" + name + ": " + what); };
   if (o.width < 64 || o.width > 4096 || o.height < 48 || o.height > 3072) {
     refuse("size " + std::to_string(o.width) + "x" + std::to_string(o.height) + " is not within 64x48 to 4096x3072");
   }
@@ -59,6 +59,7 @@ SyntheticSource::SyntheticSource(const std::string& name, const SyntheticOptions
   info_.pairs = options.frames;
 
   scene_ = entry.make(options.seed);
+  call_cast(0.0);
   calibration_ = scene_.rig.calibration(options.width, options.height);
   Random random(mix_bits(options.seed) + 5);
   // Linear gains; a grey level goes with about their square root: the right picture is 4 to 6 % darker or brighter.
@@ -80,6 +81,14 @@ SyntheticSource::SyntheticSource(const std::string& name, const SyntheticOptions
   }
 }
 
+void SyntheticSource::call_cast(double t_s) {
+  // A cast starts up to its prelude before its act; acts do not overlap.
+  const auto act = static_cast<std::int64_t>(std::floor((t_s + scene_.prelude_s) / scene_.act_s));
+  if (act == act_) return;
+  cast_ = scene_.cast(static_cast<std::uint32_t>(act));
+  act_ = act;
+}
+
 Next SyntheticSource::next(FramePair& out) noexcept {
   if (done_ >= options_.frames) return Next::kEnd;
   ++done_;
@@ -89,12 +98,7 @@ Next SyntheticSource::next(FramePair& out) noexcept {
   out.capture_time = CaptureTime(std::chrono::nanoseconds(static_cast<std::int64_t>(since * 1e9 / options_.fps + 0.5)));
   try {
     const double t = since / options_.fps;
-    // A cast starts up to its prelude before its act; acts do not overlap.
-    const auto act = static_cast<std::int64_t>(std::floor((t + scene_.prelude_s) / scene_.act_s));
-    if (act != act_) {
-      cast_ = scene_.cast(static_cast<std::uint32_t>(act));
-      act_ = act;
-    }
+    call_cast(t);
     posed_.resize(std::max(posed_.size(), cast_.size()));
     posed_count_ = 0;
     for (const Actor& actor : cast_) {

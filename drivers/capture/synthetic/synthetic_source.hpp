@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,12 @@
 #include "pipeline/geometry/calibration.hpp"
 
 namespace stereotrack::capture {
+
+/// A scene that is not there or an option out of range: the user's words, not the machine, are at fault.
+class SceneError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 struct SyntheticOptions {
   std::uint64_t seed = 1;
@@ -45,10 +52,11 @@ struct GroundTruth {
 };
 
 /// `synthetic:NAME`: a scene ray-cast into two cameras. Pictures are functions of (name, seed, size, fps, ordinal)
-/// alone, the same bits on every machine. 20 to 60 ms a pair of 640 x 480; opening takes some seconds.
+/// alone, the same bits on every machine. At 640 x 480: 1 to 3 s to open (two
+/// threads), 20 to 80 ms a pair.
 class SyntheticSource final : public FrameSource {
  public:
-  /// Throws std::runtime_error for an unknown scene or an option out of range.
+  /// Throws SceneError.
   SyntheticSource(const std::string& name, const SyntheticOptions& options);
 
   [[nodiscard]] const SourceInfo& info() const noexcept override { return info_; }
@@ -62,6 +70,7 @@ class SyntheticSource final : public FrameSource {
   [[nodiscard]] const GroundTruth& truth() const noexcept { return truth_; }
 
  private:
+  void call_cast(double t_s);
   void work_out_truth();
 
   SyntheticOptions options_;

@@ -1,7 +1,6 @@
 #include "drivers/capture/synthetic/view.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <thread>
 
@@ -366,12 +365,13 @@ Vec3 View::shade(const Part& part, std::size_t sample, double u, double v, doubl
 
 /// Hidden part of the sun, smoothed with 1 2 1 in x and y.
 double View::shadow(int x, int y) const noexcept {
+  constexpr std::array<int, 16> kBitCount{0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4};
   int sum = 0;
   for (int dy = -1; dy <= 1; ++dy) {
     const int row = std::clamp(y + dy, 0, camera_.height - 1);
     for (int dx = -1; dx <= 1; ++dx) {
       const int column = std::clamp(x + dx, 0, camera_.width - 1);
-      sum += (2 - std::abs(dx)) * (2 - std::abs(dy)) * std::popcount(shadow_[index(column, row)]);
+      sum += (2 - std::abs(dx)) * (2 - std::abs(dy)) * kBitCount[shadow_[index(column, row)]];
     }
   }
   return static_cast<double>(sum) / (16.0 * kSamples);

@@ -112,10 +112,15 @@ void build_yard(Scene& scene, Random& random) {
   yard.block({-30, 0, 36}, {30 + gap, random.uniform(5.4, 6.4), 8}, house);
   yard.block({gap + random.uniform(4.0, 6.0), 0, 31}, {30, random.uniform(4.6, 5.4), 8}, house2);
   const int leaves = yard.material(Pattern::kFoliage, rgb(38, 62, 30), rgb(108, 132, 66), dark, 0.55);
-  for (int i = 0; i < 3; ++i) {
-    const double x = random.uniform(-9, 9);
+  for (const double around : {-7.0, 0.5, 6.5}) {
+    const double x = around + random.uniform(-2.5, 2.5);
     const double z = random.uniform(20, 26);
-    yard.bush({x, random.uniform(3.0, 3.9), z}, {random.uniform(1.3, 2.0), random.uniform(1.2, 1.7), 1.5}, leaves);
+    const double top = random.uniform(3.4, 4.2);
+    for (int crown = 0; crown < 6; ++crown) {
+      const double r = random.uniform(0.55, 1.05);
+      yard.bush({x + random.uniform(-1.3, 1.3), top + random.uniform(-0.7, 0.45), z + random.uniform(-0.6, 0.6)},
+                {r * 1.15, r * 0.9, r}, leaves);
+    }
   }
 
   // A container on one side, a shed on the other.

@@ -1,0 +1,180 @@
+#include "firmware-app/stereotrack/synth.hpp"
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <future>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "config/calibration/read_calibration.hpp"
+#include "config/error.hpp"
+#include "drivers/capture/synthetic/synthetic_source.hpp"
+#include "firmware-app/stereotrack/interrupt.hpp"
+#include "firmware-app/stereotrack/output_file.hpp"
+#include "firmware-app/stereotrack/progress.hpp"
+
+namespace stereotrack {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array<const char*, 4> kFolders{"left", "right", "masks", "disparity"};
+
+std::optional<int> whole_number(std::string_view text) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::pair<int, int> parse_size(const std::string& text) {
+  const std::size_t by = text.find('x');
+  if (by != std::string::npos) {
+    const std::optional<int> width = whole_number(std::string_view(text).substr(0, by));
+    const std::optional<int> height = whole_number(std::string_view(text).substr(by + 1));
+    if (width && height) return {*width, *height};
+  }
+  throw config::Error("--size " + text + ": is not WIDTHxHEIGHT, like 640x480");
+}
+
+std::string numbered(std::uint64_t ordinal) {
+  std::array<char, 32> name{};
+  (void)std::snprintf(name.data(), name.size(), "%06llu.png", static_cast<unsigned long long>(ordinal));
+  return name.data();
+}
+
+/// A file that is whole or gone. Not flushed to the disk one by one: there are thousands.
+void write_whole(const fs::path& path, const std::vector<std::uint8_t>& bytes) {
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  int error = file == nullptr ? errno : 0;
+  if (file != nullptr) {
+    if (std::fwrite(bytes.data(), 1, bytes.size(), file) != bytes.size()) error = errno;
+    if (std::fclose(file) != 0 && error == 0) error = errno;
+  }
+  if (error == 0) return;
+  std::error_code ignored;
+  if (file != nullptr) fs::remove(path, ignored);
+  throw std::runtime_error(path.string() + ": cannot be written: " + std::strerror(error) +
+                           (error == ENOSPC ? ": free some space or choose another folder" : ""));
+}
+
+/// Copies of what one pair is written from, so that the next can be drawn meanwhile.
+struct PairPictures {
+  std::uint64_t ordinal = 0;
+  std::array<cv::Mat, kFolders.size()> pictures;  ///< in the order of kFolders
+
+  void write(const fs::path& out) const {
+    std::vector<std::uint8_t> bytes;
+    for (std::size_t i = 0; i < kFolders.size(); ++i) {
+      const fs::path path = out / kFolders[i] / numbered(ordinal);
+      if (!cv::imencode(".png", pictures[i], bytes, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
+        throw std::runtime_error(path.string() + ": cannot be encoded as PNG");
+      }
+      write_whole(path, bytes);
+    }
+  }
+};
+
+template <class T>
+cv::Mat copy_of(const T* data, int width, int height, int type) {
+  // OpenCV has no view of memory that may only be read; clone() reads.
+  return cv::Mat(height, width, type, const_cast<T*>(data)).clone();  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+}
+
+std::string truth_rows(std::uint64_t frame, const std::vector<capture::TrueObject>& objects) {
+  std::string rows;
+  for (const capture::TrueObject& o : objects) {
+    std::array<char, 256> line{};
+    (void)std::snprintf(line.data(), line.size(), "%llu,%u,%d,%d,%d,%d,%d,%.5f,%.5f,%.5f\n",
+                        static_cast<unsigned long long>(frame), o.id, o.box.left, o.box.top, o.box.width, o.box.height,
+                        o.scored() ? 1 : 0, o.x, o.y, o.z);
+    rows += line.data();
+  }
+  return rows;
+}
+
+void prepare(const fs::path& out) {
+  make_output_folder(out);
+  std::error_code ignored;
+  for (const char* whole : {"gt.csv", "calibration.yml"}) fs::remove(out / whole, ignored);
+  for (const char* folder : kFolders) make_output_folder(out / folder);
+}
+
+void remove_later_ones(const fs::path& out, std::uint64_t last) {
+  std::error_code ignored;
+  for (const char* folder : kFolders) {
+    for (std::uint64_t n = last + 1; fs::remove(out / folder / numbered(n), ignored); ++n) {
+    }
+  }
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, SynthArguments& arguments) {
+  command.add_option("scene", arguments.scene, "name of the scene, like eleven")->required();
+  command.add_option("--out", arguments.out, "folder for left/ right/ masks/ disparity/ calibration.yml gt.csv")->required();
+  command.add_option("--seed", arguments.seed, "another seed, another drawing of the scene")->capture_default_str();
+  command.add_option("--frames", arguments.frames, "how many pairs")->capture_default_str();
+  command.add_option("--size", arguments.size, "WIDTHxHEIGHT of a picture")->capture_default_str();
+}
+
+int run_synth(const SynthArguments& arguments, std::ostream& messages) {
+  constexpr std::string_view kPrefix = "synthetic:";
+  const std::string name =
+      arguments.scene.starts_with(kPrefix) ? arguments.scene.substr(kPrefix.size()) : arguments.scene;
+  capture::SyntheticOptions options;
+  options.seed = arguments.seed;
+  options.frames = arguments.frames;
+  std::tie(options.width, options.height) = parse_size(arguments.size);
+  options.truth = true;
+  std::unique_ptr<capture::SyntheticSource> source;
+  try {
+    source = capture::open_synthetic(name, options);
+  } catch (const capture::SceneError& error) {
+    throw config::Error(error.what());
+  }
+  prepare(arguments.out);
+  catch_interrupts();
+
+  Progress progress(messages, options.frames);
+  std::string rows;
+  std::future<void> writing;
+  FramePair pair;
+  while (!interrupted()) {
+    const capture::Next next = source->next(pair);
+    if (next == capture::Next::kEnd) break;
+    if (next == capture::Next::kSkipped) throw std::runtime_error(source->skip_reason());
+    const capture::GroundTruth& truth = source->truth();
+    PairPictures pictures{pair.ordinal,
+                          {copy_of(pair.left.data, options.width, options.height, CV_8UC3),
+                           copy_of(pair.right.data, options.width, options.height, CV_8UC3),
+                           copy_of(truth.labels.data(), options.width, options.height, CV_8UC1),
+                           copy_of(truth.disparity.data(), options.width, options.height, CV_16UC1)}};
+    rows += truth_rows(pair.ordinal, truth.objects);
+    if (writing.valid()) writing.get();
+    writing = std::async(std::launch::async, [&out = arguments.out, pictures = std::move(pictures)] { pictures.write(out); });
+    progress.step();
+  }
+  if (writing.valid()) writing.get();
+  progress.finish();
+  if (interrupted()) {
+    throw std::runtime_error(arguments.out.string() + ": interrupted; the pictures so far are whole, gt.csv is missing");
+  }
+  remove_later_ones(arguments.out, options.frames);
+  OutputFile truth_file(arguments.out / "gt.csv");
+  truth_file.write(rows);
+  calibration::write_opencv((arguments.out / "calibration.yml").string(), source->calibration());
+  truth_file.commit();
+  return 0;
+}
+
+}  // namespace stereotrack

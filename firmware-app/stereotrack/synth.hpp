@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace stereotrack {
+
+/// `stereotrack synth SCENE --out DIR [--seed N] [--frames N] [--size WxH]`
+struct SynthArguments {
+  std::string scene;           ///< NAME, or synthetic:NAME
+  std::filesystem::path out;   ///< made if it is not there
+  std::uint64_t seed = 1;
+  std::uint64_t frames = 600;
+  std::string size = "640x480";
+};
+
+/// Declares the arguments above.
+void add_options(CLI::App& command, SynthArguments& arguments);
+
+/// Writes into `out`
+///     left/%06d.png right/%06d.png   8-bit colour
+///     masks/%06d.png                 0 still, 50 shadow of a moving object, 255 moving object; left view
+///     disparity/%06d.png             16 bit, true disparity x 256 of the left view, 0 = none (sky)
+///     calibration.yml                OpenCV keys, unit metres
+///     gt.csv                         frame,id,left,top,width,height,confidence,x,y,z of every visible object;
+///                                    confidence 0 (not scored) where under a quarter of it is visible
+/// Numbered pictures of an earlier run are overwritten, or removed when it had more of them. gt.csv and
+/// calibration.yml appear last, whole: without them the folder is not a finished sequence.
+/// Answers the exit code, 0. Throws config::Error for a wrong scene, size or count, std::runtime_error if
+/// something cannot be written or the user interrupts.
+int run_synth(const SynthArguments& arguments, std::ostream& messages);
+
+}  // namespace stereotrack
