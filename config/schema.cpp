@@ -129,6 +129,8 @@ std::vector<Key> keys_of(Configuration& c) {
           "A region whose disparity is the background's own within this is light or a mark, not an object; 0: off."),
 
       key("objects.min_area_px", p.objects.min_area_px, 1, 1000000, "px", "Smaller objects are rejected."),
+      key("objects.min_area_ppm", p.objects.min_area_ppm, 0, 100000, "1e-6 of the picture",
+          "And objects smaller than this part of the picture: 100 is 31 px of 640x480."),
       key("objects.merge_gap", p.objects.merge_gap, 0, 2, "size",
           "Gap across which pieces at one depth are one object, as a fraction of the larger one's longer side."),
       key("objects.merge_depth", p.objects.merge_depth, 0, 1, "disparity",
@@ -136,6 +138,8 @@ std::vector<Key> keys_of(Configuration& c) {
       key("objects.split_depth", p.objects.split_depth, 0.01, 1, "disparity",
           "Gap in disparity that makes two objects of one region, as a fraction of the disparity."),
       key("objects.split_min_px", p.objects.split_min_px, 0.5, 50, "px", "And at least this much."),
+      key("objects.split_known", p.objects.split_known, 0, 1, "area",
+          "Part of a region whose disparity must be known before it is split by depth."),
       key("objects.split_part", p.objects.split_part, 0.01, 0.5, "area",
           "Part of a region that a layer of depth needs to be an object."),
       key("objects.most_scatter", p.objects.most_scatter, 0.01, 1, "disparity",

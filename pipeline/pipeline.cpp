@@ -535,7 +535,7 @@ void Pipeline::match_small(Detector::Candidate& candidate, const Detector::Input
   const auto match = region_matcher_->run<std::uint16_t>(left_.canvas, right_.canvas, canvas_labels_, 1, roi, range,
                                                          right_moving_);
   if (!match.has_value() || !match->found) return;
-  const bool convincing = match->uniqueness >= 1.2 && (right_moving_.empty() || match->foreground_share >= 0.5);
+  const bool convincing = match->uniqueness >= 1.5 && (right_moving_.empty() || match->foreground_share >= 0.5);
   if (!convincing) return;
   candidate.has_depth = true;
   candidate.disparity = match->disparity_px;

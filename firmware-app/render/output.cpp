@@ -18,6 +18,8 @@
 #include <utility>
 #include <vector>
 
+#include "firmware-app/render/matroska.hpp"
+
 namespace stereotrack::render {
 namespace {
 
@@ -111,6 +113,7 @@ class VideoOutput final : public Output {
       remove_part();
       return;
     }
+    if (lower_extension(path_) == ".mkv") make_ids_constant(part_.string());
     const std::uint64_t readable = frames_in_part();
     if (readable != frames_) {
       remove_part();

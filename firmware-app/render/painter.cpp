@@ -182,7 +182,7 @@ void Painter::draw_picture(const Picture& raw, const FrameResult& result) {
     const cv::Point2d by(track.image_vx * kLookAhead_s * scale_, track.image_vy * kLookAhead_s * scale_);
     draw_arrow(picture, drawn(track.image_x, track.image_y), by, kLongestArrow_px, pen_of(track));
   }
-  Labels labels(picture);
+  Labels labels(picture, true);
   for (const TrackReport& track : result.tracks) {
     if (!is_target(track)) continue;
     std::string text = id_text(track.id);

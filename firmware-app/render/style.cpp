@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace stereotrack::render {
 namespace {
@@ -103,7 +104,7 @@ std::vector<Polyline> dashes(Polyline points, bool closed) {
 cv::Scalar colour_of(std::uint32_t id) {
   static const std::array<cv::Scalar, 12> kColours{{
       {79, 90, 255},    // red
-      {255, 170, 70},   // blue
+      {255, 150, 60},   // blue
       {63, 215, 255},   // yellow
       {255, 115, 220},  // violet
       {100, 220, 80},   // green
@@ -149,7 +150,7 @@ void draw_fading_line(cv::Mat& picture, const Polyline& points, const std::vecto
   // Strengths are drawn first and the colour mixed in once, or the joints of the segments would show as beads.
   cv::Mat strength(box.size(), CV_8UC1, cv::Scalar::all(0));
   for (std::size_t i = 0; i + 1 < points.size() && i < strengths.size(); ++i) {
-    const double grey = std::lround(255 * std::clamp(strengths[i], 0.0, 1.0));
+    const double grey = std::round(255 * std::clamp(strengths[i], 0.0, 1.0));
     stroke(strength, {points[i], points[i + 1]}, false, cv::Scalar::all(grey), thickness, cv::Point2d(box.tl()));
   }
   for (int y = 0; y < box.height; ++y) {
@@ -210,14 +211,17 @@ void draw_text(cv::Mat& picture, const std::string& text, cv::Point origin, doub
 
 void Labels::draw(const std::string& text, const cv::Rect& thing, double scale, const cv::Scalar& colour) {
   constexpr int kGap = 4;
+  constexpr int kDot_px = 16;
   const cv::Size size = text_size(text, scale) + cv::Size(2 * kGap, 2 * kGap);
   const int centre_y = thing.y + (thing.height - size.height) / 2;
-  const std::array<cv::Point, 6> places{{{thing.x, thing.y - size.height},
-                                         {thing.x, thing.y + thing.height},
-                                         {thing.x + thing.width, centre_y},
-                                         {thing.x - size.width, centre_y},
-                                         {thing.x + thing.width, thing.y - size.height},
-                                         {thing.x - size.width, thing.y + thing.height}}};
+  std::array<cv::Point, 6> places{{{thing.x, thing.y - size.height},
+                                   {thing.x, thing.y + thing.height},
+                                   {thing.x + thing.width, centre_y},
+                                   {thing.x - size.width, centre_y},
+                                   {thing.x + thing.width, thing.y - size.height},
+                                   {thing.x - size.width, thing.y + thing.height}}};
+  // Above a dot is where its ellipse and often its arrow are.
+  if (thing.width <= kDot_px) std::swap(places[0], places[2]);
   const cv::Rect whole(cv::Point(), picture_.size());
   cv::Rect best;
   int best_hidden = -1;
@@ -233,9 +237,10 @@ void Labels::draw(const std::string& text, const cv::Rect& thing, double scale, 
     best_hidden = hidden;
   }
   taken_.push_back(best);
-  const cv::Rect tag = best & whole;
-  cv::Mat part = picture_(tag);
-  cv::addWeighted(part, 0.4, cv::Mat(tag.size(), CV_8UC3, kOutline), 0.6, 0, part);
+  if (tags_) {
+    cv::Mat part = picture_(best & whole);
+    cv::addWeighted(part, 0.4, cv::Mat(part.size(), CV_8UC3, kOutline), 0.6, 0, part);
+  }
   draw_text(picture_, text, {best.x + kGap, best.y + best.height - kGap}, scale, colour);
 }
 

@@ -45,14 +45,19 @@ void draw_arrow(cv::Mat& picture, cv::Point2d from, cv::Point2d by, double longe
 /// `origin`: left end of the base line.
 void draw_text(cv::Mat& picture, const std::string& text, cv::Point origin, double scale, const cv::Scalar& colour);
 
-/// Writes names beside things, on dark tags, so that they do not cover each other, as far as there is room.
+/// Writes names beside things so that they do not cover each other, as far as there is room.
 class Labels {
  public:
-  explicit Labels(cv::Mat& picture) : picture_(picture) {}
+  /// tags: on dark tags, for pictures of anything.
+  Labels(cv::Mat& picture, bool tags) : picture_(picture), tags_(tags) {}
+
+  /// Names should not cover this either.
+  void keep_clear(const cv::Rect& thing) { taken_.push_back(thing); }
   void draw(const std::string& text, const cv::Rect& thing, double scale, const cv::Scalar& colour);
 
  private:
   cv::Mat& picture_;
+  bool tags_;
   std::vector<cv::Rect> taken_;
 };
 

@@ -143,8 +143,8 @@ void TopView::draw_track(cv::Mat& picture, const TrackReport& track, const Trail
   const cv::Point2d at = place(size, track.position.x(), track.position.z());
   const cv::Point2d inside(std::clamp(at.x, 6.0, size.width - 6.0), std::clamp(at.y, 6.0, size.height - 6.0));
   if (inside != at) {
-    draw_dot(picture, inside, 4, pen.colour);
-    draw_dot(picture, inside, 1.5, kBackground);
+    draw_dot(picture, inside, 5, pen.colour);
+    draw_dot(picture, inside, 1, kBackground);
     return;
   }
   Polyline trail;
@@ -173,13 +173,21 @@ void TopView::draw(cv::Mat& picture, const FrameResult& result, const Trails& tr
   for (const TrackReport& track : result.tracks) {
     if (usable(track)) draw_track(picture, track, trails);
   }
-  Labels labels(picture);
-  for (const TrackReport& track : result.tracks) {
-    if (!usable(track) || track.state == TrackState::kTentative) continue;
-    const cv::Point2d at = place(picture.size(), track.position.x(), track.position.z());
+  const auto dot_at = [&](const Eigen::Vector3d& position) {
+    const cv::Point2d at = place(picture.size(), position.x(), position.z());
     const cv::Point dot(static_cast<int>(std::clamp(at.x, 0.0, picture.cols - 1.0)),
                         static_cast<int>(std::clamp(at.y, 0.0, picture.rows - 1.0)));
-    labels.draw(id_text(track.id), {dot.x - 6, dot.y - 6, 13, 13}, kLabel, colour_of(track.id));
+    return cv::Rect(dot.x - 6, dot.y - 6, 13, 13);
+  };
+  Labels labels(picture, false);
+  for (const TrackReport& track : result.tracks) {
+    if (!usable(track)) continue;
+    labels.keep_clear(dot_at(track.position));
+    labels.keep_clear(dot_at(track.position + kLookAhead_s * track.velocity));
+  }
+  for (const TrackReport& track : result.tracks) {
+    if (!usable(track) || track.state == TrackState::kTentative) continue;
+    labels.draw(id_text(track.id), dot_at(track.position), kLabel, colour_of(track.id));
   }
 }
 

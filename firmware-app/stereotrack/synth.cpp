@@ -121,7 +121,8 @@ void remove_later_ones(const fs::path& out, std::uint64_t last) {
 
 void add_options(CLI::App& command, SynthArguments& arguments) {
   command.add_option("scene", arguments.scene, "name of the scene, like eleven")->required();
-  command.add_option("--out", arguments.out, "folder for left/ right/ masks/ disparity/ calibration.yml gt.csv")->required();
+  command.add_option("--out", arguments.out, "folder for left/ right/ masks/ disparity/ calibration.yml gt.csv")
+      ->required();
   command.add_option("--seed", arguments.seed, "another seed, another drawing of the scene")->capture_default_str();
   command.add_option("--frames", arguments.frames, "how many pairs")->capture_default_str();
   command.add_option("--size", arguments.size, "WIDTHxHEIGHT of a picture")->capture_default_str();
@@ -161,13 +162,15 @@ int run_synth(const SynthArguments& arguments, std::ostream& messages) {
                            copy_of(truth.disparity.data(), options.width, options.height, CV_16UC1)}};
     rows += truth_rows(pair.ordinal, truth.objects);
     if (writing.valid()) writing.get();
-    writing = std::async(std::launch::async, [&out = arguments.out, pictures = std::move(pictures)] { pictures.write(out); });
+    writing =
+        std::async(std::launch::async, [&out = arguments.out, pictures = std::move(pictures)] { pictures.write(out); });
     progress.step();
   }
   if (writing.valid()) writing.get();
   progress.finish();
   if (interrupted()) {
-    throw std::runtime_error(arguments.out.string() + ": interrupted; the pictures so far are whole, gt.csv is missing");
+    throw std::runtime_error(arguments.out.string() +
+                             ": interrupted; the pictures so far are whole, gt.csv is missing");
   }
   remove_later_ones(arguments.out, options.frames);
   OutputFile truth_file(arguments.out / "gt.csv");

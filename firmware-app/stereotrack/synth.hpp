@@ -13,8 +13,8 @@ namespace stereotrack {
 
 /// `stereotrack synth SCENE --out DIR [--seed N] [--frames N] [--size WxH]`
 struct SynthArguments {
-  std::string scene;           ///< NAME, or synthetic:NAME
-  std::filesystem::path out;   ///< made if it is not there
+  std::string scene;          ///< NAME, or synthetic:NAME
+  std::filesystem::path out;  ///< made if it is not there
   std::uint64_t seed = 1;
   std::uint64_t frames = 600;
   std::string size = "640x480";

@@ -20,6 +20,7 @@ struct Detection {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
   std::array<std::uint8_t, 3> colour{};  ///< mean Y, Cb, Cr over its mask; Cb = Cr = 128 for grey sources
+  bool whole = true;                     ///< not cut out of a larger region
   double strength = 0;                   ///< 0..1, how far above the foreground threshold it stands
 
   [[nodiscard]] double centre_x() const noexcept { return box.left + (box.width - 1) * 0.5; }
@@ -30,6 +31,7 @@ struct Detection {
 struct Prediction {
   std::uint32_t id = 0;
   bool confirmed = false;
+  bool independent = false;  ///< has been seen as a region of its own, not only cut out of another's
   Rect box;                 ///< expected box, raw left picture, may reach outside [px]
   double image_sd = 0;      ///< standard deviation of its centre, the larger axis [px]
   bool has_depth = false;

@@ -17,7 +17,7 @@ constexpr std::size_t kBins = 0x10000 / kBin;
 // A claim counts if at least this part of the smaller of target and blob is common to both.
 constexpr double kClaimPart = 0.25;
 // Targets of which the smaller lies inside the larger by this much are taken for one object.
-constexpr double kNestedPart = 0.7;
+constexpr double kNestedPart = 0.6;
 // A depth that does not fit counts against a pixel at most this much.
 constexpr double kMostDepthCost = 16.0;
 // A region's disparity is never known better than this, whatever the number of pixels: errors of neighbours go
@@ -36,7 +36,7 @@ int gap(const Rect& a, const Rect& b) noexcept {
 
 Result<Detector> Detector::create(const Config& config, int width, int height, Arena& arena) noexcept {
   if (config.min_area_px < 1 || !(config.merge_gap >= 0) || !(config.merge_depth >= 0) || !(config.split_depth > 0) ||
-      !(config.split_min_px > 0) || !(config.split_part > 0) || !(config.most_scatter > 0) ||
+      !(config.split_min_px > 0) || !(config.split_part > 0) || !(config.split_known >= 0) || !(config.min_area_ppm >= 0) || !(config.most_scatter > 0) ||
       !(config.match_noise_px > 0)) {
     return fail(Fault::kBadConfig);
   }
@@ -46,6 +46,7 @@ Result<Detector> Detector::create(const Config& config, int width, int height, A
   self.config_ = config;
   self.width_ = width;
   self.height_ = height;
+  self.min_area_ = std::max(config.min_area_px, static_cast<int>(config.min_area_ppm * 1e-6 * width * height + 0.5));
   self.candidates_ = BoundedVector<Candidate>(arena.array<Candidate>(kMaxCandidates));
   self.detections_ = BoundedVector<Detection>(arena.array<Detection>(kMaxDetections));
   self.histogram_ = arena.array<std::uint32_t>(kBins);
@@ -57,7 +58,7 @@ Result<Detector> Detector::create(const Config& config, int width, int height, A
 void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
   for (std::size_t k = 0; k < in.predictions.size() && layers_.size() < layers_.capacity(); ++k) {
     const Prediction& target = in.predictions[k];
-    if (!target.confirmed) continue;
+    if (!target.confirmed || !target.independent) continue;
     const Rect expected = intersect(target.box, {0, 0, width_, height_});
     const Rect common = intersect(expected, blob.box);
     if (common.empty()) continue;
@@ -95,7 +96,8 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
       const auto lesser = static_cast<double>(std::min(box.area(), target.box.area()));
       if (static_cast<double>(intersect(box, target.box).area()) < kNestedPart * lesser) continue;
       if (other.has_depth && layer.has_depth &&
-          std::abs(other.disparity - layer.disparity) > other.disparity_sd + layer.disparity_sd) {
+          std::abs(other.disparity - layer.disparity) >
+              std::max(config_.split_min_px, config_.split_depth * std::max(other.disparity, layer.disparity))) {
         continue;
       }
       rival = true;
@@ -116,8 +118,8 @@ void Detector::layers_from_depth(const Input& in, const Blob& blob) noexcept {
     ++histogram_[d / kBin];
     ++total;
   });
-  if (total < static_cast<std::uint32_t>(2 * config_.min_area_px)) return;
-  const auto least = static_cast<std::uint32_t>(std::max(config_.split_part * total, 1.0 * config_.min_area_px));
+  if (total < static_cast<std::uint32_t>(2 * min_area_) || total < config_.split_known * blob.area) return;
+  const auto least = static_cast<std::uint32_t>(std::max(config_.split_part * total, 1.0 * min_area_));
   // A layer ends where the next split_depth of disparity holds next to nothing.
   std::uint32_t in_layer = 0;
   double weighted = 0;
@@ -169,11 +171,12 @@ std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
   return best;
 }
 
-void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim) noexcept {
+void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, bool whole) noexcept {
   Candidate candidate{};
   candidate.label = label;
   candidate.box = box;
   candidate.claim = claim;
+  candidate.whole = whole;
   candidate.root = static_cast<std::uint16_t>(candidates_.size());
   if (!candidates_.push(candidate)) reject(Rejection::kNoRoom);
 }
@@ -189,7 +192,7 @@ void Detector::split(const Input& in, const Blob& blob) noexcept {
   if (layers_.size() < 2) {
     const std::uint16_t label = next_label_++;
     for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) { choice_.at(x, y) = label; });
-    add_candidate(label, blob.box, -1);
+    add_candidate(label, blob.box, -1, true);
     return;
   }
   const std::uint16_t first = next_label_;
@@ -233,7 +236,7 @@ void Detector::split(const Input& in, const Blob& blob) noexcept {
     choice_.at(x, y) = static_cast<std::uint16_t>(first + most);
   });
   for (std::size_t k = 0; k < layers_.size(); ++k) {
-    add_candidate(static_cast<std::uint16_t>(first + k), blob.box, layers_[k].claim);
+    add_candidate(static_cast<std::uint16_t>(first + k), blob.box, layers_[k].claim, false);
   }
 }
 
@@ -337,6 +340,7 @@ void Detector::merge(const Input& in) noexcept {
     const std::size_t root = root_of(i);
     if (root == i || candidates_[i].area == 0) continue;
     relabel_region(in.labels, candidates_[i].box, candidates_[i].label, candidates_[root].label);
+    candidates_[root].whole = candidates_[root].whole && candidates_[i].whole;
     candidates_[root].box = unite(candidates_[root].box, candidates_[i].box);
     if (candidates_[root].claim < 0) candidates_[root].claim = candidates_[i].claim;
     candidates_[i].area = 0;
@@ -390,6 +394,7 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   out = Detection{};
   out.box = candidate.box;
   out.area = candidate.area;
+  out.whole = candidate.whole;
   std::array<std::uint64_t, 3> colour{};
   std::uint64_t strength = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -445,7 +450,7 @@ std::span<const Detection> Detector::conclude(const Input& in) noexcept {
   });
   const std::uint16_t offset = 0x8000;
   for (const Candidate& candidate : candidates_) {
-    if (candidate.area < config_.min_area_px) {
+    if (candidate.area < min_area_) {
       reject(Rejection::kSmall);
       continue;
     }

@@ -34,8 +34,8 @@ using RejectionCounts = std::array<std::uint32_t, kRejections>;
 
 /// Blobs and depth -> detections: candidates are split, merged and rejected.
 ///
-/// Split: where two or more confirmed targets are expected in one blob, each pixel goes to the target that
-/// explains it best,
+/// Split: where two or more confirmed targets, each seen on its own before, are expected in one blob, each pixel
+/// goes to the target that explains it best,
 ///     cost = ((x - x_t) / w_t)^2 + ((y - y_t) / h_t)^2 + ((d - d_t) / s_t)^2,
 /// else a blob whose disparities form layers with a gap of split_depth between them is split into the layers.
 /// Merge: pieces that one confirmed target explains, or that are close in the picture (merge_gap) and in depth
@@ -52,10 +52,12 @@ class Detector {
 
   struct Config {
     int min_area_px = 24;         ///< 1..1e6
-    double merge_gap = 0.30;      ///< gap between boxes, as a fraction of the larger one's longer side, 0..2
+    double min_area_ppm = 100;    ///< and this part of the picture, 0..1e5 [1e-6]: blur grows with the resolution
+    double merge_gap = 0.15;      ///< gap between boxes, as a fraction of the larger one's longer side, 0..2
     double merge_depth = 0.10;    ///< difference of disparity, as a fraction of the larger, 0..1
-    double split_depth = 0.12;    ///< gap between layers, as a fraction of the disparity, 0.01..1
+    double split_depth = 0.20;    ///< gap between layers, as a fraction of the disparity, 0.01..1
     double split_min_px = 2.0;    ///< and at least this much [px], 0.5..50
+    double split_known = 0.5;     ///< part of a blob whose disparity must be known to split it by depth, 0..1
     double split_part = 0.12;     ///< a layer is at least this part of its blob, 0.01..0.5
     double most_scatter = 0.15;   ///< median absolute deviation of an object's disparities, as a fraction, 0.01..1
     double match_noise_px = 0.25; ///< standard deviation of a disparity [px], 0.02..5
@@ -80,6 +82,7 @@ class Detector {
     std::uint16_t label;  ///< of its pixels in Input::labels
     Rect box;             ///< [px]
     int area;             ///< [px]
+    bool whole;           ///< not cut out of a larger blob
     int claim;            ///< index of the confirmed prediction that explains it, -1 = none
     int valid;            ///< pixels with a disparity of their own
     bool has_depth;       ///< disparity and disparity_sd are known
@@ -116,7 +119,7 @@ class Detector {
   void layers_from_claims(const Input& in, const Blob& blob) noexcept;
   void layers_from_depth(const Input& in, const Blob& blob) noexcept;
   [[nodiscard]] std::size_t choose(const Input& in, int x, int y) const noexcept;
-  void add_candidate(std::uint16_t label, const Rect& box, int claim) noexcept;
+  void add_candidate(std::uint16_t label, const Rect& box, int claim, bool whole) noexcept;
   void measure(const Input& in, Candidate& candidate) noexcept;
   void merge(const Input& in) noexcept;
   [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
@@ -128,6 +131,7 @@ class Detector {
   Config config_;
   int width_ = 0;
   int height_ = 0;
+  int min_area_ = 0;
   std::uint16_t next_label_ = 1;
   ConvexHull hull_;
   RejectionCounts rejections_{};

@@ -70,6 +70,7 @@ std::span<const Prediction> Tracker::predict(double dt) noexcept {
     Prediction prediction;
     prediction.id = target.id;
     prediction.confirmed = target.state != TrackState::kTentative;
+    prediction.independent = target.whole_hits >= config_.confirm_hits;
     const Vector2 centre = target.image.position();
     prediction.box = {static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
                       static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
@@ -166,6 +167,7 @@ void Tracker::measure(Target& target, const Detection& detection) noexcept {
   target.misses_in_a_row = 0;
   target.unseen_s = 0;
   ++target.hits;
+  if (detection.whole) ++target.whole_hits;
   const double rate = target.hits < 5 ? 1.0 / target.hits : kAppearanceRate;
   target.width += (detection.box.width - target.width) * rate;
   target.height += (detection.box.height - target.height) * rate;
@@ -216,6 +218,7 @@ void Tracker::start(const Detection& detection) noexcept {
   target.box = detection.box;
   target.hull = detection.hull;
   target.hits = 1;
+  target.whole_hits = detection.whole ? 1 : 0;
   target.measured = true;
   target.image.start(Vector2(target.first_x, target.first_y), centre_noise(config_, detection.box),
                      config_.initial_speed * view_.focal);

@@ -78,6 +78,7 @@ class Tracker {
     bool measured;
     bool has_depth;
     int hits;
+    int whole_hits;  // detections that were regions of their own
     int misses_in_a_row;
     int frames;
     double age_s;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The rules of docs/CONTRIBUTING.md that a compiler and clang-tidy do not know. One line a finding:
-FILE:LINE: [rule] what is wrong. Exit 1 if there is any. The rules themselves are tested by rules_are_on.py.
+FILE:LINE: [rule] what is wrong. Exit 1 if there is any. The rules themselves are tested by test_rules.py.
 """
 import argparse
 import pathlib

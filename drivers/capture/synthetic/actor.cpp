@@ -101,8 +101,8 @@ void pose_walker(const Actor& actor, const Place3& place, PosedActor& out) {
   const double shoulder = hip + 0.52 * s;
   body.egg({0, hip + 0.03 * s, 0}, {0.165 * s, 0.13 * s, 0.125 * s}, actor.materials[1]);
   body.egg({0, hip + 0.29 * s, lean * 0.3 * s}, {0.185 * s, 0.31 * s, 0.13 * s}, actor.materials[0]);
-  body.limb({-0.14 * s, shoulder - 0.02 * s, lean * 0.5 * s}, {0.14 * s, shoulder - 0.02 * s, lean * 0.5 * s}, 0.075 * s,
-            actor.materials[0]);
+  body.limb({-0.14 * s, shoulder - 0.02 * s, lean * 0.5 * s}, {0.14 * s, shoulder - 0.02 * s, lean * 0.5 * s},
+            0.075 * s, actor.materials[0]);
   body.limb({0, shoulder, lean * 0.5 * s}, {0, shoulder + 0.1 * s, lean * 0.6 * s}, 0.055 * s, actor.materials[2]);
   body.egg({0, shoulder + 0.2 * s, lean * 0.8 * s + 0.015 * s}, {0.082 * s, 0.115 * s, 0.1 * s}, actor.materials[2]);
   body.egg({0, shoulder + 0.235 * s, lean * 0.8 * s - 0.012 * s}, {0.09 * s, 0.1 * s, 0.105 * s}, actor.materials[3]);
@@ -300,7 +300,8 @@ bool pose(const Actor& actor, double t_s, PosedActor& out) {
   }
   out.center = (low + high) * 0.5;
   out.radius = 0;
-  for (const Shape& s : out.shapes) out.radius = std::max(out.radius, length(s.center - out.center) + s.bounding_radius);
+  for (const Shape& s : out.shapes)
+    out.radius = std::max(out.radius, length(s.center - out.center) + s.bounding_radius);
   return true;
 }
 

@@ -64,7 +64,6 @@ Place unroll(const Shape& shape, Vec3 p, Vec3 n) noexcept {
   return {pinned_atan2(p.x, -p.z) * shape.half.x, p.y, 0};
 }
 
-
 /// Distance to the nearest multiple of `period`.
 double to_grid(double v, double period) noexcept {
   const double f = fraction(v / period + 0.5) - 0.5;
@@ -89,7 +88,8 @@ Vec3 paving(const Material& m, double u, double v) noexcept {
 
 Vec3 asphalt(const Material& m, double u, double v) noexcept {
   const double patch = smoothstep(0.05, 0.25, fractal_noise(u * 0.3, v * 0.3, 4, m.seed));
-  const double grain = fractal_noise(u * 22.0, v * 22.0, 2, m.seed + 3) + 0.7 * fractal_noise(u * 4.0, v * 4.0, 2, m.seed + 4);
+  const double grain =
+      fractal_noise(u * 22.0, v * 22.0, 2, m.seed + 3) + 0.7 * fractal_noise(u * 4.0, v * 4.0, 2, m.seed + 4);
   const double crack_field = fractal_noise(u * 0.8, v * 0.8, 4, m.seed + 5);
   const double crack = 1.0 - smoothstep(0.006, 0.018, std::abs(crack_field));
   return mottled(mix(m.a, m.b, patch), 0.28 * grain - 0.45 * crack);
@@ -181,7 +181,8 @@ Vec3 logo(const Material& m, Place p, double grain) noexcept {
 }
 
 Vec3 cardboard(const Material& m, const Shape& shape, Place p) noexcept {
-  const double flute = 0.05 * noise(p.u * 60.0, p.v * 3.0, m.seed) + 0.10 * fractal_noise(p.u * 2.0, p.v * 2.0, 3, m.seed + 1);
+  const double flute =
+      0.05 * noise(p.u * 60.0, p.v * 3.0, m.seed) + 0.10 * fractal_noise(p.u * 2.0, p.v * 2.0, 3, m.seed + 1);
   const Vec3 base = mottled(m.a, flute);
   if (p.face == 2) return std::abs(p.v) < 0.06 ? mottled(m.b, 0.3 * flute) : base;
   const double width = p.face == 1 ? shape.half.z : shape.half.x;
@@ -191,7 +192,8 @@ Vec3 cardboard(const Material& m, const Shape& shape, Place p) noexcept {
   const double x = p.u / width - 0.45;
   const double y = p.v / shape.half.y + 0.35;
   if (std::abs(x) < 0.32 && std::abs(y) < 0.3) {  // address label
-    const bool ink = fraction(y * 9.0) < 0.5 && cell(whole(x * 30.0), whole(y * 9.0), 7, m.seed) > -0.4 && std::abs(x) < 0.27;
+    const bool ink =
+        fraction(y * 9.0) < 0.5 && cell(whole(x * 30.0), whole(y * 9.0), 7, m.seed) > -0.4 && std::abs(x) < 0.27;
     return ink ? m.c * 0.08 : m.c;
   }
   const double ax = p.u / width + 0.5;
@@ -281,7 +283,8 @@ Vec3 reflectance(const Material& m, const Shape& shape, Vec3 local, Vec3 normal)
       const double x = std::abs(n.x);
       const double y = std::abs(n.y);
       const double z = std::abs(n.z);
-      const double nearest = std::fmax(std::fmax(y + kGolden * z, x + kGolden * y), z + kGolden * x) / 1.9021130325903071;
+      const double nearest =
+          std::fmax(std::fmax(y + kGolden * z, x + kGolden * y), z + kGolden * x) / 1.9021130325903071;
       return nearest > 0.915 ? m.b : m.a;
     }
     case Pattern::kLogo: return logo(m, p, 0.10 * fractal_noise(local * 6.0, 2, m.seed));
@@ -301,7 +304,8 @@ Vec3 reflectance(const Material& m, const Shape& shape, Vec3 local, Vec3 normal)
     }
     case Pattern::kFoliage: {
       const double leaf = fractal_noise(local * (1.0 / m.scale), 4, m.seed);
-      return mix(m.a, m.b, smoothstep(-0.45, 0.5, leaf)) * (0.75 + 0.5 * smoothstep(-0.2, 0.25, noise(local * (3.1 / m.scale), m.seed + 1)));
+      return mix(m.a, m.b, smoothstep(-0.45, 0.5, leaf)) *
+             (0.75 + 0.5 * smoothstep(-0.2, 0.25, noise(local * (3.1 / m.scale), m.seed + 1)));
     }
     case Pattern::kFacade: return facade(m, p.u, p.v);
     case Pattern::kPoster: return poster(m, shape, p);

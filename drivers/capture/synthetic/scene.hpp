@@ -46,7 +46,7 @@ struct Rig {
 
 /// One sun and a sky.
 struct Light {
-  Vec3 to_sun{0, 1, 0};  ///< unit
+  Vec3 to_sun{0, 1, 0};       ///< unit
   double sun_radius = 0.016;  ///< half the angle it fills, makes shadow edges soft [rad]
   Vec3 sun;                   ///< light on a surface that faces it
   Vec3 sky;                   ///< on a surface that faces up, without the sun
@@ -99,7 +99,8 @@ void cast(const PinholeCamera& camera, const Shape& shape, const Rect& box, cons
   for (int y = box.top; y < box.bottom(); ++y) {
     for (int x = box.left; x < box.right(); ++x) {
       for (std::size_t s = 0; s < N; ++s) {
-        const Vec3 direction = ahead + step_x * (x + offsets[s].x - camera.cx) + step_y * (y + offsets[s].y - camera.cy);
+        const Vec3 direction =
+            ahead + step_x * (x + offsets[s].x - camera.cx) + step_y * (y + offsets[s].y - camera.cy);
         const double depth = caster.hit(origin, direction);
         if (depth < kMiss) hit(x, y, s, depth);
       }

@@ -8,7 +8,7 @@
 namespace stereotrack::capture::synthetic {
 namespace {
 
-constexpr int kLevelShift = 7;                                     // levels are worked with x 128
+constexpr int kLevelShift = 7;                                    // levels are worked with x 128
 constexpr std::int32_t kChannelSigma = (19 << kLevelShift) / 10;  // 1.9 levels
 
 /// x^(29/64), 29/64 = 1/4 + 1/8 + 1/16 + 1/64.
@@ -31,8 +31,8 @@ Sensor::Sensor(const Config& config) : config_(config) {
     luma_sigma_[static_cast<std::size_t>(level)] =
         static_cast<std::int32_t>(std::sqrt(2.9 * 2.9 + 0.022 * level) * (1 << kLevelShift) + 0.5);
   }
-  const double half_diagonal2 = 0.25 * (static_cast<double>(config.width) * config.width +
-                                        static_cast<double>(config.height) * config.height);
+  const double half_diagonal2 =
+      0.25 * (static_cast<double>(config.width) * config.width + static_cast<double>(config.height) * config.height);
   column_fall_off_.resize(static_cast<std::size_t>(config.width));
   for (int x = 0; x < config.width; ++x) {
     const double dx = x - 0.5 * (config.width - 1);
@@ -46,7 +46,8 @@ void Sensor::expose(const float* light, int y, std::uint64_t frame, std::uint8_t
                                         static_cast<double>(config_.height) * config_.height);
   const double dy = y - 0.5 * (config_.height - 1);
   const auto row_fall_off = static_cast<float>(1.0 - config_.vignetting * dy * dy / half_diagonal2);
-  const float gain[3] = {static_cast<float>(config_.gain.x * kCurveSize), static_cast<float>(config_.gain.y * kCurveSize),
+  const float gain[3] = {static_cast<float>(config_.gain.x * kCurveSize),
+                         static_cast<float>(config_.gain.y * kCurveSize),
                          static_cast<float>(config_.gain.z * kCurveSize)};
   const std::uint64_t key = mix_bits(mix_bits(config_.seed * 2 + static_cast<std::uint64_t>(config_.camera)) + frame);
   std::uint64_t counter = key + static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(config_.width);

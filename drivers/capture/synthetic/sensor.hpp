@@ -34,9 +34,9 @@ class Sensor {
   static constexpr int kCurveSize = 1 << 14;
 
   Config config_;
-  std::vector<std::uint16_t> curve_;               ///< light / kCurveSize to level x 128
-  std::array<std::int32_t, 256> luma_sigma_{};     ///< level to standard deviation x 128
-  std::vector<float> column_fall_off_;             ///< vignetting's part of x
+  std::vector<std::uint16_t> curve_;            ///< light / kCurveSize to level x 128
+  std::array<std::int32_t, 256> luma_sigma_{};  ///< level to standard deviation x 128
+  std::vector<float> column_fall_off_;          ///< vignetting's part of x
 };
 
 }  // namespace stereotrack::capture::synthetic

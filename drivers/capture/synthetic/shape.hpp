@@ -21,8 +21,8 @@ struct Shape {
   Vec3 center;
   Axes axes;
   Vec3 half{1, 1, 1};
-  int material = 0;           ///< index into the scene's materials
-  bool casts_shadow = true;   ///< false: paint, posters and other flat things
+  int material = 0;            ///< index into the scene's materials
+  bool casts_shadow = true;    ///< false: paint, posters and other flat things
   double bounding_radius = 0;  ///< of a sphere around `center`, set by the makers below
 };
 
@@ -95,7 +95,8 @@ class Caster {
       if (t > 0 && y >= -half_.y && y <= half_.y) return t;
     }
     if (kind_ == ShapeKind::kCapsule) {
-      return std::min(hit_sphere({o.x, o.y - half_.y, o.z}, d, radius2), hit_sphere({o.x, o.y + half_.y, o.z}, d, radius2));
+      return std::min(hit_sphere({o.x, o.y - half_.y, o.z}, d, radius2),
+                      hit_sphere({o.x, o.y + half_.y, o.z}, d, radius2));
     }
     if (d.y > -1e-12 && d.y < 1e-12) return kMiss;
     const double t = ((d.y > 0 ? -half_.y : half_.y) - o.y) / d.y;  // the end that faces the ray

@@ -64,8 +64,8 @@ SyntheticSource::SyntheticSource(const std::string& name, const SyntheticOptions
   Random random(mix_bits(options.seed) + 5);
   // Linear gains; a grey level goes with about their square root: the right picture is 4 to 6 % darker or brighter.
   const double brighter = random.chance(0.5) ? random.uniform(1.095, 1.13) : random.uniform(0.885, 0.915);
-  const std::array<Vec3, 2> gains{Vec3{1, 1, 1},
-                                  Vec3{brighter * random.uniform(0.97, 1.03), brighter, brighter * random.uniform(0.95, 1.05)}};
+  const std::array<Vec3, 2> gains{
+      Vec3{1, 1, 1}, Vec3{brighter * random.uniform(0.97, 1.03), brighter, brighter * random.uniform(0.95, 1.05)}};
   constexpr double kExposure = 0.92;
   views_.reserve(2);
   for (int i = 0; i < 2; ++i) {
@@ -118,7 +118,8 @@ Next SyntheticSource::next(FramePair& out) noexcept {
     return Next::kSkipped;
   }
   const auto picture = [&](std::size_t i) {
-    return Picture{pixels_[i].data(), options_.width, options_.height, std::ptrdiff_t{3} * options_.width, PixelFormat::kBgr8};
+    return Picture{pixels_[i].data(), options_.width, options_.height, std::ptrdiff_t{3} * options_.width,
+                   PixelFormat::kBgr8};
   };
   out.left = picture(0);
   out.right = picture(1);
@@ -182,7 +183,8 @@ void SyntheticSource::work_out_truth() {
         if (stamp == 0) ++sums[a].whole;
         const bool inside = x >= 0 && y >= 0 && x < width && y < height;
         if (inside && stamp < 2) {
-          const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+          const std::size_t i =
+              static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
           const int owner = owners[i];
           if (owner >= 0 && owner != static_cast<int>(a) && depth > static_cast<double>(depths[i])) {
             ++sums[a].hidden;
@@ -198,10 +200,11 @@ void SyntheticSource::work_out_truth() {
   for (std::size_t a = 0; a < posed_count_; ++a) {
     const Sum& s = sums[a];
     if (s.count == 0) continue;
-    truth_.objects.push_back(
-        {posed_[a].id, s.box, s.x / s.count, s.y / s.count, s.z / s.count, s.count, s.hidden, std::max(s.whole, s.count)});
+    truth_.objects.push_back({posed_[a].id, s.box, s.x / s.count, s.y / s.count, s.z / s.count, s.count, s.hidden,
+                              std::max(s.whole, s.count)});
   }
-  std::sort(truth_.objects.begin(), truth_.objects.end(), [](const TrueObject& a, const TrueObject& b) { return a.id < b.id; });
+  std::sort(truth_.objects.begin(), truth_.objects.end(),
+            [](const TrueObject& a, const TrueObject& b) { return a.id < b.id; });
 }
 
 std::unique_ptr<SyntheticSource> open_synthetic(const std::string& name, const SyntheticOptions& options) {

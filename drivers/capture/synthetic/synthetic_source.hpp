@@ -32,23 +32,24 @@ struct SyntheticOptions {
 
 /// What is true of one moving object in one frame; left picture.
 struct TrueObject {
-  std::uint32_t id = 0;                  ///< from 1
-  Rect box;                              ///< of the visible pixels [px]
-  double x = 0, y = 0, z = 0;            ///< mean of the visible surface, left rectified camera frame [m]
-  int visible_px = 0;                    ///< pixels of which the object fills the most
-  int hidden_px = 0;                     ///< pixels it would fill if the other moving objects were not there, but does not
-  int whole_px = 0;                      ///< pixels of all of it, were nothing in front and the picture endless
+  std::uint32_t id = 0;        ///< from 1
+  Rect box;                    ///< of the visible pixels [px]
+  double x = 0, y = 0, z = 0;  ///< mean of the visible surface, left rectified camera frame [m]
+  int visible_px = 0;          ///< pixels of which the object fills the most
+  int hidden_px = 0;           ///< pixels it would fill if the other moving objects were not there, but does not
+  int whole_px = 0;            ///< pixels of all of it, were nothing in front and the picture endless
   [[nodiscard]] bool scored() const noexcept { return 4 * visible_px >= whole_px; }
 };
 
 struct GroundTruth {
   static constexpr std::uint8_t kStill = 0;
-  static constexpr std::uint8_t kShadow = 50;   ///< an object's shadow on what stands still: 16 % less light, 8 % in grey
+  static constexpr std::uint8_t kShadow =
+      50;  ///< an object's shadow on what stands still: 16 % less light, 8 % in grey
   static constexpr std::uint8_t kMoving = 255;
 
-  std::vector<TrueObject> objects;        ///< with a visible pixel, by id
-  std::vector<std::uint8_t> labels;       ///< width x height, the constants above (those of changedetection.net)
-  std::vector<std::uint16_t> disparity;   ///< width x height, [px] x 256, of the left view; 0 = the sky
+  std::vector<TrueObject> objects;       ///< with a visible pixel, by id
+  std::vector<std::uint8_t> labels;      ///< width x height, the constants above (those of changedetection.net)
+  std::vector<std::uint16_t> disparity;  ///< width x height, [px] x 256, of the left view; 0 = the sky
 };
 
 /// `synthetic:NAME`: a scene ray-cast into two cameras. Pictures are functions of (name, seed, size, fps, ordinal)
@@ -92,6 +93,7 @@ class SyntheticSource final : public FrameSource {
 };
 
 /// NAME of `synthetic:NAME`.
-[[nodiscard]] std::unique_ptr<SyntheticSource> open_synthetic(const std::string& name, const SyntheticOptions& options = {});
+[[nodiscard]] std::unique_ptr<SyntheticSource> open_synthetic(const std::string& name,
+                                                              const SyntheticOptions& options = {});
 
 }  // namespace stereotrack::capture

@@ -10,17 +10,37 @@ namespace {
 constexpr float kSkyDepth = 1e6F;
 
 /// Where a pixel's four rays go: a rotated grid, every row and column of a 4 x 4 grid once.
-constexpr std::array<Offset, View::kSamples> kOffsets{{{-0.125, -0.375}, {0.375, -0.125}, {-0.375, 0.125}, {0.125, 0.375}}};
+constexpr std::array<Offset, View::kSamples> kOffsets{
+    {{-0.125, -0.375}, {0.375, -0.125}, {-0.375, 0.125}, {0.125, 0.375}}};
 
 /// What stands still: the same four, then eight more, then the centre.
-constexpr std::array<Offset, 13> kStillOffsets{{{-0.125, -0.375}, {0.375, -0.125}, {-0.375, 0.125}, {0.125, 0.375},
-                                                {-0.42, -0.42}, {0.16, -0.44}, {0.44, -0.40}, {-0.20, -0.10},
-                                                {0.14, 0.06}, {0.44, 0.20}, {-0.44, 0.44}, {-0.12, 0.20},
+constexpr std::array<Offset, 13> kStillOffsets{{{-0.125, -0.375},
+                                                {0.375, -0.125},
+                                                {-0.375, 0.125},
+                                                {0.125, 0.375},
+                                                {-0.42, -0.42},
+                                                {0.16, -0.44},
+                                                {0.44, -0.40},
+                                                {-0.20, -0.10},
+                                                {0.14, 0.06},
+                                                {0.44, 0.20},
+                                                {-0.44, 0.44},
+                                                {-0.12, 0.20},
                                                 {0, 0}}};
 
 /// Directions into the sun's disc for the rays of kStillOffsets, in radii.
-constexpr std::array<Offset, 13> kSunDisc{{{-0.5, -0.5}, {0.5, -0.5}, {-0.5, 0.5}, {0.5, 0.5}, {0.9, 0.1}, {-0.9, 0.1},
-                                           {0.1, 0.9}, {0.1, -0.9}, {0.3, 0.2}, {-0.3, -0.2}, {0.7, -0.6}, {-0.7, 0.6},
+constexpr std::array<Offset, 13> kSunDisc{{{-0.5, -0.5},
+                                           {0.5, -0.5},
+                                           {-0.5, 0.5},
+                                           {0.5, 0.5},
+                                           {0.9, 0.1},
+                                           {-0.9, 0.1},
+                                           {0.1, 0.9},
+                                           {0.1, -0.9},
+                                           {0.3, 0.2},
+                                           {-0.3, -0.2},
+                                           {0.7, -0.6},
+                                           {-0.7, 0.6},
                                            {0, 0}}};
 
 /// A direction `offset` radii off the middle of the sun.
@@ -108,7 +128,7 @@ void View::cast_statics_rows(int first, int last, std::span<const Rect> boxes) {
     origins.push_back(casters.back().origin(camera_.position));
     if (scene_.statics[i].casts_shadow && i > 0) shaders.push_back(i);
   }
-  std::size_t last_shader = 0;  // what hid the sun last is likely to hide it again
+  std::size_t last_shader = 0;    // what hid the sun last is likely to hide it again
   std::vector<std::size_t> near;  // shapes that this tile may show
 
   for (int top = first; top < last; top += kTile) {
@@ -155,7 +175,8 @@ void View::cast_statics_rows(int first, int last, std::span<const Rect> boxes) {
               center_normal = normal;
               center_open = openness(scene_, point, normal);
             }
-            const Vec3 colour = reflectance(scene_.materials[static_cast<std::size_t>(shape.material)], shape, local, flat);
+            const Vec3 colour =
+                reflectance(scene_.materials[static_cast<std::size_t>(shape.material)], shape, local, flat);
             sky_sum = sky_sum + colour * skylight(scene_.light, normal) * center_open;
             const double facing = dot(normal, sun[k]);
             if (facing <= 0) continue;
@@ -296,7 +317,8 @@ void View::cast_shadow(const Part& part) {
 void View::cast_contact(const Shape& sphere) {
   const double r = sphere.half.x;
   constexpr double kReach = 4.0;
-  const Rect box = intersect(screen_box(camera_, {sphere.center.x, 0.5 * sphere.center.y, sphere.center.z}, 2.5 * r), frame_);
+  const Rect box =
+      intersect(screen_box(camera_, {sphere.center.x, 0.5 * sphere.center.y, sphere.center.z}, 2.5 * r), frame_);
   if (box.empty() || sphere.center.y > kReach * r) return;
   dirty_.push_back(box);
   mark(box);
@@ -331,7 +353,8 @@ void View::find_shaders(std::size_t first, std::size_t count) {
     }
     for (std::size_t other = 0; other < scene_.statics.size(); ++other) {
       const Shape& o = scene_.statics[other];
-      if (!o.casts_shadow || !may_shade(s.center, s.bounding_radius, o.center, o.bounding_radius, scene_.light.to_sun)) continue;
+      if (!o.casts_shadow || !may_shade(s.center, s.bounding_radius, o.center, o.bounding_radius, scene_.light.to_sun))
+        continue;
       // The floor and walls behind are in every sphere but shade nothing in front of them.
       if (o.kind == ShapeKind::kBox && o.bounding_radius > 15.0) continue;
       part.static_shaders.push_back(static_cast<std::uint16_t>(other));
@@ -353,11 +376,10 @@ Vec3 View::shade(const Part& part, std::size_t sample, double u, double v, doubl
   const double facing = dot(normal, to_sun_[sample]);
   if (facing > 0) {
     const Vec3 above = point + normal * 2e-3;
-    const bool hidden =
-        std::any_of(part.shaders.begin(), part.shaders.end(),
-                    [&](std::uint16_t i) { return blocks(parts_[i].shape, above, to_sun_[sample]); }) ||
-        std::any_of(part.static_shaders.begin(), part.static_shaders.end(),
-                    [&](std::uint16_t i) { return blocks(scene_.statics[i], above, to_sun_[sample]); });
+    const bool hidden = std::any_of(part.shaders.begin(), part.shaders.end(),
+                                    [&](std::uint16_t i) { return blocks(parts_[i].shape, above, to_sun_[sample]); }) ||
+                        std::any_of(part.static_shaders.begin(), part.static_shaders.end(),
+                                    [&](std::uint16_t i) { return blocks(scene_.statics[i], above, to_sun_[sample]); });
     if (!hidden) light = light + scene_.light.sun * (facing * level.sun);
   }
   return colour * light;

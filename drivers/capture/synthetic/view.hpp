@@ -86,7 +86,7 @@ class View {
   std::vector<std::uint8_t> contact_;  ///< skylight taken away, of 255
   std::vector<Part> parts_;
   std::size_t part_count_ = 0;
-  std::vector<Rect> dirty_;                    ///< what this frame's actors may have touched
+  std::vector<Rect> dirty_;                   ///< what this frame's actors may have touched
   std::vector<std::array<int, 2>> row_span_;  ///< the same, by rows: first and one past the last column
   std::vector<float> row_;
 };

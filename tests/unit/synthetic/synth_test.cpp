@@ -1,0 +1,152 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <string>
+
+#include "config/calibration/read_calibration.hpp"
+#include "config/error.hpp"
+#include "firmware-app/stereotrack/synth.hpp"
+
+namespace stereotrack {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Synth : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "stereotrack_synth_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    arguments_.scene = "eleven";
+    arguments_.out = folder_ / "out";
+    arguments_.size = "96x72";
+    arguments_.frames = 3;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// What is thrown, or "".
+  template <class Error>
+  std::string refusal() {
+    std::ostringstream messages;
+    try {
+      (void)run_synth(arguments_, messages);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  }
+  static std::string content(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  fs::path folder_;
+  SynthArguments arguments_;
+};
+
+TEST_F(Synth, WritesPicturesTruthAndCalibration) {
+  std::ostringstream messages;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  for (const char* n : {"000001.png", "000002.png", "000003.png"}) {
+    const cv::Mat left = cv::imread((arguments_.out / "left" / n).string(), cv::IMREAD_UNCHANGED);
+    EXPECT_EQ(left.type(), CV_8UC3);
+    EXPECT_EQ(left.size(), cv::Size(96, 72));
+    EXPECT_EQ(cv::imread((arguments_.out / "right" / n).string(), cv::IMREAD_UNCHANGED).type(), CV_8UC3);
+    EXPECT_EQ(cv::imread((arguments_.out / "masks" / n).string(), cv::IMREAD_UNCHANGED).type(), CV_8UC1);
+    EXPECT_EQ(cv::imread((arguments_.out / "disparity" / n).string(), cv::IMREAD_UNCHANGED).type(), CV_16UC1);
+  }
+  EXPECT_FALSE(fs::exists(arguments_.out / "left" / "000004.png"));
+
+  const auto read = calibration::read_calibration_file((arguments_.out / "calibration.yml").string());
+  EXPECT_EQ(read.stereo.left.width, 96);
+  EXPECT_EQ(read.stereo.left.fx, 90.0);
+  EXPECT_EQ(read.stereo.t_right_left.x(), -0.25);
+
+  // frame,id,left,top,width,height,confidence,x,y,z; the robot is there from the first frame on.
+  EXPECT_THAT(content(arguments_.out / "gt.csv"),
+              testing::ContainsRegex(
+                  "^1,1,[0-9]+,[0-9]+,[0-9]+,[0-9]+,[01],-?[0-9]+\\.[0-9]{5},-?[0-9]+\\.[0-9]{5},[0-9]+\\.[0-9]{5}\n"));
+}
+
+TEST_F(Synth, SameArgumentsGiveTheSameBytes) {
+  std::ostringstream messages;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  const std::string truth = content(arguments_.out / "gt.csv");
+  const std::string left = content(arguments_.out / "left" / "000003.png");
+  arguments_.out = folder_ / "again";
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  EXPECT_EQ(content(arguments_.out / "gt.csv"), truth);
+  EXPECT_EQ(content(arguments_.out / "left" / "000003.png"), left);
+  arguments_.seed = 2;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  EXPECT_NE(content(arguments_.out / "left" / "000003.png"), left);
+}
+
+TEST_F(Synth, ShorterRunLeavesNothingOfALongerOne) {
+  std::ostringstream messages;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  arguments_.frames = 1;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  for (const char* sub : {"left", "right", "masks", "disparity"}) {
+    EXPECT_TRUE(fs::exists(arguments_.out / sub / "000001.png"));
+    EXPECT_FALSE(fs::exists(arguments_.out / sub / "000002.png"));
+    EXPECT_FALSE(fs::exists(arguments_.out / sub / "000003.png"));
+  }
+}
+
+TEST_F(Synth, WrongWordsAreBadUsageAndTouchNothing) {
+  arguments_.scene = "twelve";
+  EXPECT_THAT(refusal<config::Error>(), testing::HasSubstr("eleven"));
+  arguments_.scene = "synthetic:eleven";
+  for (const char* size : {"96", "96x", "x72", "96x72x3", "axb", "10x10", "5000x72", "-96x72"}) {
+    arguments_.size = size;
+    EXPECT_NE(refusal<config::Error>(), "") << size;
+  }
+  arguments_.size = "96x72";
+  arguments_.frames = 0;
+  EXPECT_THAT(refusal<config::Error>(), testing::HasSubstr("100000"));
+  EXPECT_FALSE(fs::exists(arguments_.out));
+}
+
+TEST_F(Synth, FileInTheWayIsNamed) {
+  std::ofstream(arguments_.out) << "mine";
+  EXPECT_THAT(refusal<std::runtime_error>(), testing::HasSubstr(arguments_.out.string()));
+  EXPECT_EQ(content(arguments_.out), "mine");
+}
+
+TEST_F(Synth, UnwritableFolderIsNamed) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
+  fs::create_directory(arguments_.out);
+  fs::permissions(arguments_.out, fs::perms::owner_read | fs::perms::owner_exec);
+  EXPECT_THAT(refusal<std::runtime_error>(), testing::HasSubstr(arguments_.out.string()));
+  fs::permissions(arguments_.out, fs::perms::owner_all);
+}
+
+// A limit on the size of files stands for a full disk.
+TEST_F(Synth, PictureThatDoesNotFitIsRemovedAndNamed) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit tight = before;
+  tight.rlim_cur = 4096;
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &tight), 0);
+  const std::string what = refusal<std::runtime_error>();
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  (void)std::signal(SIGXFSZ, handler);
+  EXPECT_THAT(what, testing::HasSubstr("left/000001.png: cannot be written"));
+  EXPECT_FALSE(fs::exists(arguments_.out / "left" / "000001.png"));
+  EXPECT_FALSE(fs::exists(arguments_.out / "gt.csv"));
+  EXPECT_FALSE(fs::exists(arguments_.out / "calibration.yml"));
+}
+
+}  // namespace
+}  // namespace stereotrack
