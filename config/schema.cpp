@@ -78,9 +78,9 @@ std::vector<Key> keys_of(Configuration& c) {
       key("background.relearn_percent", p.background.adaptive.relearn_percent, 1, 100, "%",
           "When more of the picture changes at once, it is light, not motion: the background starts anew, flagged."),
 
-      key("foreground.low_sd", p.foreground.low_sd, 0.5, 30, "sd",
+      key("foreground.low_sd", p.foreground.low_sd, 0.5, 60, "sd",
           "Distance from the background from which a pixel may belong to an object."),
-      key("foreground.high_sd", p.foreground.high_sd, 0.5, 31, "sd",
+      key("foreground.high_sd", p.foreground.high_sd, 0.5, 60, "sd",
           "Distance that some pixels of an object must reach."),
       key("foreground.halo_percent", p.foreground.halo_percent, 0, 90, "%",
           "Pixels weaker than this part of a strong neighbour are its blur, not object: higher gives tighter boxes."),
@@ -123,6 +123,9 @@ std::vector<Key> keys_of(Configuration& c) {
           "How much a shadow may change Cb and Cr."),
       key("shadow.texture_tolerance", p.shadow.test.texture_tolerance, 0, 255, "grey levels",
           "How much a shadow may change the background's own texture."),
+      key("shadow.weak_percent", p.shadow.test.weak_percent, 0, 90, "%",
+          "Parts of a region that stand out less than this part of the region do, and show the background's texture, are "
+          "its reflection or haze; 0: off."),
       key("shadow.disparity_px", p.shadow.test.disparity_px, 0, 16, "px",
           "Disparities this near count as the background's own."),
       key("shadow.own_depth_px", p.shadow.own_depth_px, 0, 16, "px",

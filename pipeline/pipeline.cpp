@@ -84,6 +84,7 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   };
   planes(self.left_, setup.colour);
   self.scratch_ = arena.image<std::uint8_t>(setup.width, setup.height);
+  self.typical_distance_ = arena.array<std::uint8_t>(static_cast<std::size_t>(config.shape.max_blobs) + 1);
   self.moving_ = arena.image<std::uint8_t>(setup.width, setup.height);
   self.equalise_left_ = Equalise({config.equalise});
   self.equalise_right_ = Equalise({config.equalise});
@@ -463,8 +464,26 @@ ShadowTest::Input Pipeline::shadow_input() const noexcept {
           .y_background = background_left_->luma(),
           .cb_background = background_left_->blue(),
           .cr_background = background_left_->red(),
+          .distance = left_.distance,
+          .labels = blobs_.labels,
+          .typical = typical_distance_,
           .disparity = disparity_,
           .disparity_background = old_disparity_};
+}
+
+void Pipeline::measure_strength() noexcept {
+  for (const Blob& blob : blobs_.blobs) {
+    std::array<std::int32_t, 256> histogram{};
+    for_each_pixel(blobs_.labels, blob.box, blob.label,
+                   [&](int x, int y) { ++histogram[left_.distance.at(x, y)]; });
+    std::int32_t above = 0;
+    int level = 255;
+    while (level > 0 && (above + histogram[static_cast<std::size_t>(level)]) * 4 < blob.area) {
+      above += histogram[static_cast<std::size_t>(level)];
+      --level;
+    }
+    typical_distance_[blob.label] = static_cast<std::uint8_t>(level);
+  }
 }
 
 // Regions that stereo knows to be no object, as a whole: light and marks on the background's own surface, and
@@ -504,6 +523,7 @@ void Pipeline::remove_shadows() noexcept {
     }
   } else if (background_left_) {
     reject_background();
+    measure_strength();
     (void)shadow_test_->run(shadow_input(), left_.mask);
   }
   for (const Blob& blob : blobs_.blobs) {

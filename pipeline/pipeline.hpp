@@ -111,6 +111,7 @@ class Pipeline {
   void match_blob(const Blob& blob) noexcept;
   void renew_background_disparity() noexcept;
   void reject_background() noexcept;
+  void measure_strength() noexcept;
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;
@@ -131,6 +132,7 @@ class Pipeline {
   CaptureTime last_time_{};
   std::span<const Prediction> predictions_;
   BlobSet blobs_;
+  std::span<std::uint8_t> typical_distance_;  ///< by label: 75th percentile of the distance
   RejectionCounts rejections_{};
 
   Planes left_;

@@ -87,7 +87,7 @@ struct PairPictures {
 template <class T>
 cv::Mat copy_of(const T* data, int width, int height, int type) {
   // OpenCV has no view of memory that may only be read; clone() reads.
-  return cv::Mat(height, width, type, const_cast<T*>(data)).clone();  // NOLINT(cppcoreguidelines-pro-type-const-cast)
+  return cv::Mat(height, width, type, const_cast<T*>(data)).clone();
 }
 
 std::string truth_rows(std::uint64_t frame, const std::vector<capture::TrueObject>& objects) {

@@ -119,12 +119,12 @@ void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t>
       const int tolerance = range_.at(x, y) * config_.edge_percent * 256 / 100;
       const int apart = std::abs((picture.y.at(x, y) << 8) - ((y_.mean.at(x, y) * gain_) >> 8));
       const int noise = y_.deviation.at(x, y) * 5 / 4 + config_.noise_floor;
-      const int luma = std::max(apart - tolerance, 0) * 8 / noise;
+      const int luma = std::max(apart - tolerance, 0) * kStepsPerSd / noise;
       int colour = 0;
       if (colour_) {
-        const int blue = std::abs((picture.cb.at(x, y) << 8) - cb_.mean.at(x, y)) * 8 /
+        const int blue = std::abs((picture.cb.at(x, y) << 8) - cb_.mean.at(x, y)) * kStepsPerSd /
                          (cb_.deviation.at(x, y) * 5 / 4 + config_.noise_floor);
-        const int red = std::abs((picture.cr.at(x, y) << 8) - cr_.mean.at(x, y)) * 8 /
+        const int red = std::abs((picture.cr.at(x, y) << 8) - cr_.mean.at(x, y)) * kStepsPerSd /
                         (cr_.deviation.at(x, y) * 5 / 4 + config_.noise_floor);
         colour = std::max(blue, red);
       }

@@ -20,8 +20,8 @@ namespace stereotrack {
 /// saturate at absorb_frames), they change places: what was there at start and left, dissolves quickly; what
 /// stops in view, is absorbed after absorb_frames.
 ///
-/// Distance of a picture from the background, in standard deviations, 8 steps each:
-///     z = 8 max(0, |x - g m| - e R) / (1.25 a + floor)
+/// Distance of a picture from the background, in standard deviations, 4 steps each:
+///     z = 4 max(0, |x - g m| - e R) / (1.25 a + floor)
 /// g: gain of the light (median ratio of picture and background over the pixels not lately foreground), so
 /// that exposure drift is no motion; R: range of m in the 3x3 neighbourhood, so that an edge which moves by
 /// a fraction e of a pixel is no motion either. Channels combine as max + half the smaller.
@@ -30,6 +30,8 @@ namespace stereotrack {
 /// Integers only (8.8 fixed point). One instance a view; one thread; O(pixels).
 class AdaptiveBackground {
  public:
+  static constexpr int kStepsPerSd = 4;  ///< of distance()
+
   struct Config {
     int window = 60;            ///< frames of the exponential window, 2..1024
     int absorb_frames = 300;    ///< frames after which what stands still is background, 2..60000
@@ -49,7 +51,7 @@ class AdaptiveBackground {
     ImageView<const std::uint8_t> cr;
   };
 
-  /// Distance of the picture from the background, 8 steps a standard deviation, saturated at 255. All 0 before
+  /// Distance of the picture from the background, kStepsPerSd a standard deviation, saturated at 255. All 0 before
   /// the first learn(). Also estimates the light's gain.
   void distance(const Planes& picture, ImageView<std::uint8_t> out) noexcept;
 

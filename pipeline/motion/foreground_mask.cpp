@@ -2,18 +2,20 @@
 
 #include <algorithm>
 
+#include "pipeline/motion/adaptive_background.hpp"
+
 namespace stereotrack {
 
 namespace {
 
-constexpr int kStepsPerSd = 8;
+constexpr int kStepsPerSd = AdaptiveBackground::kStepsPerSd;
 constexpr int kHaloReach = 2;
 constexpr int kMaxComponents = 4096;
 
 }  // namespace
 
 Result<ForegroundMask> ForegroundMask::create(const Config& config, int width, int height, Arena& arena) noexcept {
-  if (!(config.low_sd > 0) || !(config.high_sd >= config.low_sd) || !(config.high_sd <= 31) ||
+  if (!(config.low_sd > 0) || !(config.high_sd >= config.low_sd) || !(config.high_sd <= 60) ||
       config.halo_percent < 0 || config.halo_percent > 90 || config.min_seeds < 1) {
     return fail(Fault::kBadConfig);
   }

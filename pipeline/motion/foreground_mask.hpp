@@ -16,12 +16,12 @@ namespace stereotrack {
 ///    largest distance within 2 px is rim, not object;
 /// 3. a pixel stays if most of its 3x3 neighbourhood are candidates, which removes single noisy pixels;
 /// 4. components without enough seeds go: weak pixels count only where they hang on strong ones.
-/// In: distance, u8, 8 steps a standard deviation. Out: 0 or 255, same size. O(pixels). One instance a thread.
+/// In: distance, u8, AdaptiveBackground::kStepsPerSd a standard deviation. Out: 0 or 255, same size. O(pixels). One instance a thread.
 class ForegroundMask {
  public:
   struct Config {
     double low_sd = 4.0;    ///< candidate [standard deviations], 0.5..30
-    double high_sd = 8.0;   ///< seed [standard deviations], low_sd..31
+    double high_sd = 8.0;   ///< seed [standard deviations], low_sd..60
     int halo_percent = 25;  ///< 0..90; 0 keeps the halo
     int min_seeds = 5;      ///< seeds that a component needs [px], 1..10000
     int max_runs = 65536;   ///< runs of the mask; more are dropped and counted

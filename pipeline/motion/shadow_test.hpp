@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
@@ -20,7 +21,10 @@ namespace stereotrack {
 ///     darkest_percent / 100 <= r < 0.97                      darker, not black
 ///     |C - 128 - r (C_background - 128)| <= chroma tolerance, C in {Cb, Cr}
 ///     mean over 5x5 of |Y - r Y_background| <= texture tolerance
-/// the last says that the background's own texture is still there, only scaled.
+/// the last says that the background's own texture is still there, only scaled. A reflection on a glossy floor
+/// may also be brighter and of another colour; it is told by its weakness instead: with the texture kept,
+///     distance < weak_percent of the 75th percentile of its region
+/// counts as background too.
 ///
 /// The decision is a majority vote over the 5x5 foreground pixels around, so that no object is riddled.
 /// In: planes of one size; empty cb, cr for grey; empty disparities for mono. O(foreground x 25).
@@ -31,6 +35,7 @@ class ShadowTest {
     int darkest_percent = 40;   ///< smallest ratio of a shadow [%], 1..99
     int chroma_tolerance = 8;   ///< [grey levels], 0..255
     int texture_tolerance = 5;  ///< [grey levels], 0..255
+    int weak_percent = 25;      ///< 0..90; 0 = off
     double disparity_px = 1.0;  ///< disparities this near are the same [px], 0..16
   };
 
@@ -49,6 +54,9 @@ class ShadowTest {
     ImageView<const std::uint8_t> y_background;
     ImageView<const std::uint8_t> cb_background;
     ImageView<const std::uint8_t> cr_background;
+    ImageView<const std::uint8_t> distance;               ///< to the background, any unit
+    ImageView<const std::uint16_t> labels;                ///< region of each pixel, 0 = none
+    std::span<const std::uint8_t> typical;                ///< 75th percentile of distance by label
     ImageView<const std::uint16_t> disparity;             ///< 1/16 px, kNoDisparity where unknown
     ImageView<const std::uint16_t> disparity_background;  ///< the same of the background
   };
@@ -66,7 +74,7 @@ class ShadowTest {
   enum Verdict : std::uint8_t { kOutside = 0, kObject = 1, kBackground = 2 };
   enum class Depth : std::uint8_t { kUnknown, kNear, kOwn, kBehind };
   [[nodiscard]] Depth depth_of(const Input& in, int x, int y) const noexcept;
-  [[nodiscard]] bool looks_shadowed(const Input& in, int x, int y) const noexcept;
+  [[nodiscard]] bool looks_like_background(const Input& in, int x, int y) const noexcept;
   [[nodiscard]] Verdict judge(const Input& in, int x, int y) const noexcept;
 
   Config config_;

@@ -421,7 +421,7 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
     out.disparity_sd += 1;
   });
   for (std::size_t i = 0; i < 3; ++i) out.colour[i] = static_cast<std::uint8_t>(colour[i] / candidate.area);
-  out.strength = std::min(static_cast<double>(strength) / candidate.area / 160.0, 1.0);
+  out.strength = std::min(static_cast<double>(strength) / candidate.area / 80.0, 1.0);
   const double placed = out.disparity_sd;
   out.disparity_sd = 0;
   if (stereo && placed > 0 && candidate.disparity >= kMinDisparity) {

@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""Documents that are wrong are worse than none: runs the README's commands, and looks up every option, key and verb.
+
+    test_readme.py PROJECT BIN      BIN: folder that holds the built stereotrack
+"""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROJECT, BIN = (pathlib.Path(p).resolve() for p in sys.argv[1:3])
+BLOCK = re.compile(r"<!-- tested -->\n```sh\n(.*?)```", re.S)
+README = (PROJECT / "README.md").read_text()
+PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").glob("*.md"))]
+
+
+def run(command, **options):
+    env = {**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"}
+    return subprocess.run(command, env=env, capture_output=True, text=True, check=False, **options)
+
+
+def commands(page):
+    """Lines of code that call stereotrack, continued ones joined: [subcommand, text]."""
+    for text in re.findall(r"^(?:    |\$ )?(stereotrack [a-z].*)$", page.read_text().replace("\\\n", " "), re.M):
+        yield text.split()[1], text.split(" #")[0].split(" | ")[0]
+    for text in re.findall(r"`(stereotrack [a-z][^`]*)`", page.read_text()):
+        yield text.split()[1], text
+
+
+class Readme(unittest.TestCase):
+    def test_commands_run(self):
+        blocks = BLOCK.findall(README)
+        self.assertGreaterEqual(len(blocks), 3)
+        with tempfile.TemporaryDirectory() as folder:
+            for block in blocks:
+                with self.subTest(block=block):
+                    done = run(["bash", "-euo", "pipefail", "-c", block], cwd=folder, timeout=240)
+                    self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            rows = pathlib.Path(folder, "out/tracks.csv").read_text().splitlines()
+            self.assertGreater(len(rows), 0, "the README's first run tracks nothing")
+            columns = re.findall(r"^\| (`[^|]+`) \|", README.split("## Reading the output")[1], re.M)
+            self.assertEqual(len(" ".join(columns).split()), len(rows[0].split(",")))
+
+    def test_dev_verbs_exist(self):
+        told = run([str(PROJECT / "dev"), "help"]).stdout
+        for page in PAGES:
+            for verb in re.findall(r"\./dev ([a-z][a-z-]*)", page.read_text()):
+                with self.subTest(page=page.name, verb=verb):
+                    self.assertRegex(told, rf"(?m)^  {verb}\b")
+
+
+class Pages(unittest.TestCase):
+    def test_options_exist(self):
+        helps = {}
+        for page in PAGES:
+            for sub, text in commands(page):
+                if sub not in helps:
+                    done = run(["stereotrack", sub, "--help"])
+                    self.assertEqual(done.returncode, 0, f"{page.name}: {text}: no such subcommand")
+                    helps[sub] = done.stdout
+                for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", text):
+                    with self.subTest(page=page.name, command=text):
+                        self.assertIn(option, helps[sub])
+
+    def test_keys_exist(self):
+        sample, section, keys = (PROJECT / "config/stereotrack.sample.toml").read_text(), "", {"preset"}
+        for line in sample.splitlines():
+            if match := re.match(r"\[(\w+)\]", line):
+                section = match.group(1) + "."
+            elif match := re.match(r"(\w+) =", line):
+                keys.add(section + match.group(1))
+        sections = {k.split(".")[0] for k in keys}
+        for page in PAGES:
+            text = page.read_text()
+            for key in re.findall(r"--set ([\w.]+)=", text) + re.findall(r"`([a-z_]+\.[a-z_0-9]+)`", text):
+                if key.split(".")[0] in sections and not key.endswith((".csv", ".json", ".toml", ".yml")):
+                    with self.subTest(page=page.name, key=key):
+                        self.assertIn(key, keys)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
