@@ -23,6 +23,7 @@ constexpr std::size_t kMaxBytes = std::size_t{1} << 20;
 struct Position {
   std::uint32_t line = 0;
   std::uint32_t column = 0;
+  // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the 0 of the generated comparison for a pointer
   friend auto operator<=>(const Position&, const Position&) = default;
 };
 

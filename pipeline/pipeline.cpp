@@ -22,10 +22,12 @@ constexpr int kShadowRestPercent = 25;
 // A region is a ghost, light or a mark if at least this part of its known disparities says so, and those are at
 // least kEvidencePercent of its pixels.
 constexpr int kVerdictPercent = 70;
-constexpr int kEvidencePercent = 15;
+constexpr int kEvidencePercent = 30;
 // The background's disparity is renewed this much slower once it is complete.
 constexpr int kLaterPasses = 10;
 constexpr int kWidestGap = 64;  // [px]
+// A region's match counts if the second best place is at least this much worse.
+constexpr double kUnique = 1.5;
 // Room around a predicted disparity, in standard deviations and as a fraction, for targets that accelerate.
 constexpr double kRangeSd = 3;
 constexpr double kRangeFraction = 0.25;
@@ -231,7 +233,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
                                 .strength = left_.distance,
                                 .predictions = predictions_,
                                 .rectifier = rectifier()};
-  for (Detector::Candidate& candidate : detector_->segment(objects)) match_small(candidate, objects);
+  for (Detector::Candidate& candidate : detector_->segment(objects)) match_whole(candidate, objects);
   const std::span<const Detection> detections = detector_->conclude(objects);
   ended(Stage::kObjects);
   tracker_->update(detections);  // 3.25, 3.28-3.32
@@ -500,9 +502,11 @@ void Pipeline::reject_background() noexcept {
     const bool surface = (sum.own + sum.behind) * 100 >= known * kVerdictPercent;
     if (!surface) continue;
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
-      left_.mask.at(x, y) = 0;
+      blobs_.labels.at(x, y) = 0;
       if (ghost) moving_.at(x, y) = AdaptiveBackground::kForget;
     });
+    blob.area = 0;
+    ++rejections_[static_cast<std::size_t>(Rejection::kOwnSurface)];
   }
 }
 
@@ -522,7 +526,6 @@ void Pipeline::remove_shadows() noexcept {
                             left_.mask);
     }
   } else if (background_left_) {
-    reject_background();
     measure_strength();
     (void)shadow_test_->run(shadow_input(), left_.mask);
   }
@@ -535,12 +538,16 @@ void Pipeline::remove_shadows() noexcept {
   }
   (void)opening_->run(left_.mask, scratch_);
   if (const auto blobs = blob_extractor_->run(scratch_); blobs.has_value()) blobs_ = *blobs;
+  if (config_.shadow.method == ShadowMethod::kStereo) reject_background();
 }
 
-void Pipeline::match_small(Detector::Candidate& candidate, const Detector::Input& in) noexcept {
+// Where single pixels tell little, because the object is small or blurred, all of its pixels are matched together.
+void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept {
   if (!region_matcher_) return;
   const bool sparse = !candidate.has_depth || candidate.valid * 4 < candidate.area;
-  if (!sparse && candidate.area > config_.disparity.small_px) return;
+  const bool small = candidate.area <= config_.disparity.small_px;
+  const bool unknown = candidate.claim < 0 && background_right_ && config_.shadow.method == ShadowMethod::kStereo;
+  if (!sparse && !small && !unknown) return;
   const Rect roi = paint_on_canvas(candidate.box, candidate.label);
   if (roi.empty()) return;
   DisparityRange range{0, full_range_};
@@ -552,15 +559,31 @@ void Pipeline::match_small(Detector::Candidate& candidate, const Detector::Input
       range.max = std::clamp(static_cast<int>(target.disparity + room) + 1, range.min, full_range_);
     }
   }
-  const auto match = region_matcher_->run<std::uint16_t>(left_.canvas, right_.canvas, canvas_labels_, 1, roi, range,
-                                                         right_moving_);
-  if (!match.has_value() || !match->found) return;
-  const bool convincing = match->uniqueness >= 1.5 && (right_moving_.empty() || match->foreground_share >= 0.5);
-  if (!convincing) return;
-  candidate.has_depth = true;
-  candidate.disparity = match->disparity_px;
-  candidate.disparity_sd = match->sigma_px;
-  candidate.scatter = 0.5;
+  const auto match = [&](ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                         ImageView<const std::uint8_t> right_moving) {
+    const Result<RegionMatch> found =
+        region_matcher_->run<std::uint16_t>(left, right, canvas_labels_, 1, roi, range, right_moving);
+    const bool good = found.has_value() && found->found && found->uniqueness >= kUnique &&
+                      (right_moving.empty() || found->foreground_share >= 0.5);
+    return good ? *found : RegionMatch{};
+  };
+  if (sparse || small) {
+    const RegionMatch now = match(left_.canvas, right_.canvas, right_moving_);
+    if (now.found) {
+      candidate.has_depth = true;
+      candidate.disparity = now.disparity_px;
+      candidate.disparity_sd = now.sigma_px;
+      candidate.scatter = 0.5;
+    }
+  }
+  // A light, or a mark on a surface, has the disparity that the same place of the background has.
+  if (unknown && candidate.has_depth) {
+    const RegionMatch before = match(left_.background_canvas, right_.background_canvas, {});
+    const double limit = std::max(config_.shadow.own_depth_px, 2 * candidate.disparity_sd);
+    if (before.found && config_.shadow.own_depth_px > 0 && candidate.disparity - before.disparity_px <= limit) {
+      candidate.own_surface = true;
+    }
+  }
 }
 
 void Pipeline::learn_background() noexcept {

@@ -115,7 +115,7 @@ class Pipeline {
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;
-  void match_small(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
+  void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
   void learn_background() noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
   [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;

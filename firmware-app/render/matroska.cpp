@@ -16,9 +16,8 @@ using Bytes = std::span<std::uint8_t>;
 constexpr std::uint64_t kCrc32 = 0xBF;
 constexpr std::uint64_t kSegment = 0x18538067;  // the whole file: the only one that goes on behind the head
 constexpr std::array<std::uint64_t, 3> kIds{0x73A4, 0x73C5, 0x63C5};  // SegmentUID, TrackUID, TagTrackUID
-constexpr std::array<std::uint64_t, 7> kParents{0x18538067, 0x1549A966, 0x1654AE6B,
-                                                0xAE,                             // Segment, Info, Tracks, TrackEntry
-                                                0x1254C367, 0x7373,     0x63C0};  // Tags, Tag, Targets
+// Segment, Info, Tracks, TrackEntry, Tags, Tag, Targets
+constexpr std::array<std::uint64_t, 7> kParents{kSegment, 0x1549A966, 0x1654AE6B, 0xAE, 0x1254C367, 0x7373, 0x63C0};
 
 template <std::size_t N>
 bool is_one_of(const std::array<std::uint64_t, N>& all, std::uint64_t id) {

@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
@@ -59,12 +61,14 @@ int run(int argc, char** argv) {
   eval_command->add_flag("--json", eval.json, "one JSON object instead of the table");
 
   stereotrack::DisparityArguments disparity;
+  std::optional<std::string> disparity_config;
+  std::vector<std::string> disparity_set;
   CLI::App* disparity_command = app.add_subcommand("disparity", "dense disparity of a rectified pair");
   disparity_command->add_option("left", disparity.left, "left picture")->required();
   disparity_command->add_option("right", disparity.right, "right picture")->required();
   disparity_command->add_option("--out", disparity.out, "FILE.png, 16 bit, disparity x 256, 0 = none")->required();
-  disparity_command->add_option("--config", disparity.config, "configuration (TOML)");
-  disparity_command->add_option("--set", disparity.set, "KEY=VALUE")->allow_extra_args(false);
+  disparity_command->add_option("--config", disparity_config, "configuration (TOML)");
+  disparity_command->add_option("--set", disparity_set, "KEY=VALUE")->allow_extra_args(false);
 
   stereotrack::MonitorArguments monitor;
   CLI::App* monitor_command = app.add_subcommand("monitor", "receives and shows the telemetry");
@@ -91,7 +95,10 @@ int run(int argc, char** argv) {
   }
   if (*synth_command) return stereotrack::run_synth(synth, std::cerr);
   if (*eval_command) return stereotrack::run_eval(eval, std::cout);
-  if (*disparity_command) return stereotrack::run_disparity(disparity, std::cerr);
+  if (*disparity_command) {
+    return stereotrack::run_disparity(disparity, stereotrack::load_configuration(disparity_config, disparity_set),
+                                      std::cerr);
+  }
   monitor.live = isatty(STDOUT_FILENO) == 1;
   return stereotrack::run_monitor(monitor, std::cout, std::cerr);
 }

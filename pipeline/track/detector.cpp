@@ -463,7 +463,7 @@ std::span<const Detection> Detector::conclude(const Input& in) noexcept {
       reject(Rejection::kInconsistent);
       continue;
     }
-    if (on_own_surface(in, candidate)) {
+    if (candidate.own_surface || (!known && on_own_surface(in, candidate))) {
       reject(Rejection::kOwnSurface);
       continue;
     }

@@ -88,6 +88,7 @@ class Detector {
     bool has_depth;       ///< disparity and disparity_sd are known
     double disparity;     ///< median [px]
     double disparity_sd;  ///< [px]
+    bool own_surface;     ///< set by the caller: known to be part of the background's surface
     double scatter;       ///< median absolute deviation [px]
     std::uint16_t root;   ///< used while merging
   };

@@ -13,7 +13,11 @@ Shape between(ShapeKind kind, Vec3 a, Vec3 b, double radius, Vec3 side, int mate
   const Vec3 along = b - a;
   const double size = length(along);
   s.axes.y = along * (1.0 / size);
-  s.axes.x = normalized(side - s.axes.y * dot(side, s.axes.y));
+  const auto across = [&](Vec3 v) { return v - s.axes.y * dot(v, s.axes.y); };
+  Vec3 sideways = across(side);
+  if (length(sideways) < 0.1 * length(side)) sideways = across({0, 1, 0});
+  if (length(sideways) < 0.1) sideways = across({0, 0, 1});
+  s.axes.x = normalized(sideways);
   s.axes.z = {s.axes.x.y * s.axes.y.z - s.axes.x.z * s.axes.y.y, s.axes.x.z * s.axes.y.x - s.axes.x.x * s.axes.y.z,
               s.axes.x.x * s.axes.y.y - s.axes.x.y * s.axes.y.x};
   s.half = {radius, size * 0.5, radius};

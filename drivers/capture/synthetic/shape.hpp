@@ -28,7 +28,8 @@ struct Shape {
 
 [[nodiscard]] Shape ellipsoid(Vec3 center, const Axes& axes, Vec3 radii, int material) noexcept;
 [[nodiscard]] Shape box(Vec3 center, const Axes& axes, Vec3 half, int material) noexcept;
-/// Between the points a and b. `side` (not parallel to b - a) fixes the turn about the axis, for texture.
+/// Between the points a and b. `side` fixes the turn about the axis, for texture; where it lies along the
+/// axis, upwards does.
 [[nodiscard]] Shape cylinder(Vec3 a, Vec3 b, double radius, Vec3 side, int material) noexcept;
 [[nodiscard]] Shape capsule(Vec3 a, Vec3 b, double radius, Vec3 side, int material) noexcept;
 

@@ -59,6 +59,18 @@ TEST(SyntheticShape, RaysMeetEachKindWhereGeometrySays) {
   EXPECT_DOUBLE_EQ(depth_along(capsule({0, -1, 10}, {0, 1, 10}, 0.5, {1, 0, 0}, 0), {}, ahead), 9.5);
 }
 
+TEST(SyntheticShape, AxesAreUprightToEachOtherWhereverTheSidePoints) {
+  for (const Vec3 side : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}, normalized({1, 1e-9, 0})}) {
+    for (const Vec3 end : {Vec3{2, 0, 0}, Vec3{0, 3, 0}, Vec3{0, 0, 1}, Vec3{1, 1, 1}}) {
+      const Axes a = capsule({}, end, 0.1, side, 0).axes;
+      for (const Vec3 axis : {a.x, a.y, a.z}) EXPECT_NEAR(length(axis), 1.0, 1e-12);
+      EXPECT_NEAR(dot(a.x, a.y), 0.0, 1e-12);
+      EXPECT_NEAR(dot(a.y, a.z), 0.0, 1e-12);
+      EXPECT_NEAR(dot(a.z, a.x), 0.0, 1e-12);
+    }
+  }
+}
+
 TEST(SyntheticShape, RaysThatPassBesideOrPointAwayMiss) {
   for (const Shape& s :
        {ellipsoid({0, 0, 10}, {}, {1, 1, 1}, 0), box({0, 0, 10}, {}, {1, 1, 1}, 0),

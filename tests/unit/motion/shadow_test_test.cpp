@@ -1,0 +1,287 @@
+#include "pipeline/motion/shadow_test.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+
+#include "pictures.hpp"
+#include "pipeline/stereo/disparity.hpp"
+
+namespace stereotrack {
+namespace {
+
+using test::Plane;
+using test::random_plane;
+using test::view;
+using Disparities = cv::Mat_<std::uint16_t>;
+
+const cv::Size kSize(48, 40);
+const cv::Rect kRegion(12, 10, 20, 16);
+
+ShadowTest::Config config() {
+  ShadowTest::Config c;
+  c.darkest_percent = 40;
+  c.chroma_tolerance = 6;
+  c.texture_tolerance = 5;
+  c.weak_percent = 0;
+  c.disparity_px = 1;
+  return c;
+}
+
+Plane scaled(const Plane& plane, double ratio) {
+  Plane out;
+  plane.convertTo(out, CV_8U, ratio);
+  return out;
+}
+
+Disparities disparities(double px) { return {kSize, static_cast<std::uint16_t>(px * kDisparityScale)}; }
+
+/// A textured background, the present picture, and a segmented region.
+struct Scene {
+  Plane y_background = random_plane(kSize, 90, 190, 1);
+  Plane y = y_background.clone();
+  Plane cb, cr, cb_background, cr_background;
+  Disparities disparity, disparity_background;
+  Plane mask = Plane(kSize, std::uint8_t{0});
+  Plane distance = Plane(kSize, std::uint8_t{100});
+  cv::Mat_<std::uint16_t> labels = cv::Mat_<std::uint16_t>(kSize, std::uint16_t{0});
+  std::array<std::uint8_t, 2> typical{0, 100};
+
+  Scene() {
+    mask(kRegion).setTo(255);
+    labels(kRegion).setTo(1);
+  }
+
+  ShadowTest::Input input() {
+    ShadowTest::Input in;
+    in.y = view(y);
+    in.cb = view(cb);
+    in.cr = view(cr);
+    in.y_background = view(y_background);
+    in.cb_background = view(cb_background);
+    in.cr_background = view(cr_background);
+    in.distance = view(distance);
+    in.labels = view(labels);
+    in.typical = typical;
+    in.disparity = view(disparity);
+    in.disparity_background = view(disparity_background);
+    return in;
+  }
+
+  /// Part of the region that is left.
+  double left(const ShadowTest::Config& c = config()) {
+    Arena arena;
+    auto stage = ShadowTest::create(c, kSize.width, kSize.height, arena);
+    EXPECT_TRUE(stage.has_value());
+    Plane result = mask.clone();
+    const std::uint32_t cleared = stage->run(input(), view(result));
+    EXPECT_EQ(static_cast<int>(cleared), cv::countNonZero(mask) - cv::countNonZero(result));
+    EXPECT_EQ(cv::countNonZero(result & ~mask), 0) << "a pixel was added";
+    after = result;
+    return cv::countNonZero(result) / static_cast<double>(cv::countNonZero(mask));
+  }
+  Plane after;
+};
+
+TEST(ShadowTest, SameTextureDarkerIsRemovedWhereStereoIsUnknown) {
+  for (double ratio : {0.45, 0.6, 0.9}) {
+    Scene scene;
+    scene.y = scaled(scene.y_background, ratio);
+    EXPECT_EQ(scene.left(), 0) << ratio << ", mono";
+    scene.disparity = Disparities(kSize, kNoDisparity);
+    scene.disparity_background = disparities(10);
+    EXPECT_EQ(scene.left(), 0) << ratio << ", now unknown";
+    scene.disparity = disparities(14);
+    scene.disparity_background = Disparities(kSize, kNoDisparity);
+    EXPECT_EQ(scene.left(), 0) << ratio << ", background unknown";
+  }
+}
+
+TEST(ShadowTest, BlackAndBrightRegionsAreKept) {
+  for (double ratio : {0.0, 0.2, 0.37, 0.985, 1.0, 1.2}) {
+    Scene scene;
+    scene.y = scaled(scene.y_background, ratio);
+    EXPECT_EQ(scene.left(), 1) << ratio;
+  }
+}
+
+TEST(ShadowTest, DarkestRatioIsTheConfigured) {
+  Scene scene;
+  scene.y = scaled(scene.y_background, 0.3);
+  EXPECT_EQ(scene.left(), 1);
+  ShadowTest::Config c = config();
+  c.darkest_percent = 20;
+  EXPECT_EQ(scene.left(c), 0);
+}
+
+TEST(ShadowTest, OtherTextureOfTheSameLightIsKept) {
+  Scene scene;
+  scene.y = scaled(random_plane(kSize, 90, 190, 2), 0.6);
+  EXPECT_EQ(scene.left(), 1);
+  ShadowTest::Config c = config();
+  c.texture_tolerance = 255;
+  EXPECT_EQ(scene.left(c), 0) << "only the texture kept it";
+}
+
+TEST(ShadowTest, ChromaMustFadeWithTheLight) {
+  Scene scene;
+  scene.y = scaled(scene.y_background, 0.5);
+  scene.cb_background = Plane(kSize, std::uint8_t{168});
+  scene.cr_background = Plane(kSize, std::uint8_t{98});
+  scene.cb = Plane(kSize, std::uint8_t{148});  // 128 + 40 / 2
+  scene.cr = Plane(kSize, std::uint8_t{113});  // 128 - 30 / 2
+  EXPECT_EQ(scene.left(), 0);
+  scene.cb.setTo(168);
+  EXPECT_EQ(scene.left(), 1) << "Cb 20 off";
+  scene.cb.setTo(148);
+  scene.cr.setTo(98);
+  EXPECT_EQ(scene.left(), 1) << "Cr 15 off";
+  ShadowTest::Config c = config();
+  c.chroma_tolerance = 16;
+  EXPECT_EQ(scene.left(c), 0);
+}
+
+TEST(ShadowTest, WeakReflectionIsRemovedThoughItIsBrightAndOfAnotherColour) {
+  Scene scene;
+  scene.y = scaled(scene.y_background, 1.15);
+  scene.cb_background = scene.cr_background = scene.cr = Plane(kSize, std::uint8_t{128});
+  scene.cb = Plane(kSize, std::uint8_t{150});
+  scene.distance.setTo(24);
+  EXPECT_EQ(scene.left(), 1) << "switched off";
+  ShadowTest::Config c = config();
+  c.weak_percent = 25;
+  EXPECT_EQ(scene.left(c), 0);
+  scene.distance.setTo(25);
+  EXPECT_EQ(scene.left(c), 1) << "25 of 100 is not under 25 %";
+  scene.distance.setTo(24);
+  scene.y = random_plane(kSize, 90, 190, 2);
+  EXPECT_EQ(scene.left(c), 1) << "another texture";
+}
+
+TEST(ShadowTest, NearerThanTheBackgroundIsKeptWhateverItLooksLike) {
+  Scene scene;
+  scene.y = scaled(scene.y_background, 0.6);
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(11.0625);
+  EXPECT_EQ(scene.left(), 1);
+  scene.disparity = disparities(11);
+  EXPECT_EQ(scene.left(), 0) << "one pixel apart is the same surface";
+}
+
+TEST(ShadowTest, BehindTheBackgroundIsRemovedWhateverItLooksLike) {
+  Scene scene;
+  scene.y = scaled(random_plane(kSize, 90, 190, 2), 1.2);
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(8.9375);
+  EXPECT_EQ(scene.left(), 0);
+  scene.disparity = disparities(9);
+  EXPECT_EQ(scene.left(), 1) << "one pixel apart is the same surface";
+}
+
+TEST(ShadowTest, OnTheBackgroundsOwnSurfaceTheLookDecides) {
+  Scene scene;
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(10.25);
+  scene.y = scaled(scene.y_background, 0.6);
+  EXPECT_EQ(scene.left(), 0);
+  scene.y = scaled(random_plane(kSize, 90, 190, 2), 0.6);
+  EXPECT_EQ(scene.left(), 1);
+}
+
+TEST(ShadowTest, VoteClearsAFewObjectPixelsInAShadowAndKeepsAFewShadowPixelsInAnObject) {
+  Scene scene;
+  scene.y = scaled(scene.y_background, 0.6);
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(10);
+  scene.disparity(cv::Rect(20, 16, 3, 3)).setTo(20 * kDisparityScale);
+  EXPECT_EQ(scene.left(), 0);
+  scene.disparity = disparities(20);
+  scene.disparity(cv::Rect(20, 16, 3, 3)).setTo(10 * kDisparityScale);
+  EXPECT_EQ(scene.left(), 1);
+}
+
+TEST(ShadowTest, ObjectWithItsShadowIsPartedAtTheirBorder) {
+  Scene scene;
+  scene.y = scaled(scene.y_background, 0.6);
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(10);
+  const cv::Rect object(kRegion.x, kRegion.y, 10, kRegion.height);
+  scene.disparity(object).setTo(20 * kDisparityScale);
+  EXPECT_NEAR(scene.left(), 0.5, 0.06);
+  EXPECT_EQ(test::part(scene.after, test::inner(object, 1)), 1);
+}
+
+TEST(ShadowTest, EvidenceCountsEachKindOfPixel) {
+  Arena arena;
+  auto stage = ShadowTest::create(config(), kSize.width, kSize.height, arena);
+  ASSERT_TRUE(stage.has_value());
+  Scene scene;
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(10);
+  scene.disparity(0, 0) = 12 * kDisparityScale;
+  scene.disparity(0, 1) = 8 * kDisparityScale;
+  scene.disparity(0, 2) = kNoDisparity;
+  scene.disparity_background(0, 3) = kNoDisparity;
+  ShadowTest::Evidence sum;
+  for (int x = 0; x < 6; ++x) stage->weigh(scene.input(), x, 0, sum);
+  EXPECT_EQ(sum.near, 1);
+  EXPECT_EQ(sum.behind, 1);
+  EXPECT_EQ(sum.unknown, 2);
+  EXPECT_EQ(sum.own, 2);
+}
+
+TEST(ShadowTest, EmptyMaskIsNoWorkAndOnePixelIsAPicture) {
+  Scene scene;
+  scene.mask.setTo(0);
+  Arena arena;
+  auto stage = ShadowTest::create(config(), kSize.width, kSize.height, arena);
+  ASSERT_TRUE(stage.has_value());
+  EXPECT_EQ(stage->run(scene.input(), view(scene.mask)), 0U);
+  auto small = ShadowTest::create(config(), 1, 1, arena);
+  ASSERT_TRUE(small.has_value());
+  Plane y(1, 1, std::uint8_t{60});
+  Plane background(1, 1, std::uint8_t{100});
+  Plane mask(1, 1, std::uint8_t{255});
+  ShadowTest::Input in;
+  in.y = view(y);
+  in.y_background = view(background);
+  in.distance = view(mask);
+  Disparities label(1, 1, std::uint16_t{1});
+  in.labels = view(label);
+  const std::array<std::uint8_t, 2> typical{0, 255};
+  in.typical = typical;
+  EXPECT_EQ(small->run(in, view(mask)), 1U);
+  EXPECT_EQ(mask(0, 0), 0);
+}
+
+TEST(ShadowTest, BlackBackgroundHasNoShadow) {
+  Scene scene;
+  scene.y_background.setTo(0);
+  scene.y.setTo(0);
+  EXPECT_EQ(scene.left(), 1);
+}
+
+TEST(ShadowTest, Faults) {
+  Arena arena;
+  const auto fault_of = [&](auto&& change, int width = 8, int height = 8) {
+    ShadowTest::Config c = config();
+    change(c);
+    const auto created = ShadowTest::create(c, width, height, arena);
+    return created ? Fault{} : created.error();
+  };
+  const auto nothing = [](ShadowTest::Config&) {};
+  EXPECT_EQ(fault_of(nothing), Fault{});
+  EXPECT_EQ(fault_of([](auto& c) { c.darkest_percent = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.darkest_percent = 100; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.chroma_tolerance = -1; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.texture_tolerance = -1; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.disparity_px = -0.5; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.disparity_px = std::numeric_limits<double>::quiet_NaN(); }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of(nothing, 8, 0), Fault::kBadSize);
+  arena.seal();
+  EXPECT_EQ(fault_of(nothing), Fault::kOutOfMemory);
+}
+
+}  // namespace
+}  // namespace stereotrack
