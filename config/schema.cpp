@@ -60,7 +60,8 @@ std::vector<Key> keys_of(Configuration& c) {
 
       key("equalise.mode", p.equalise,
           {{"off", EqualiseMode::kOff}, {"frame", EqualiseMode::kFrame}, {"frozen", EqualiseMode::kFrozen}},
-          "Histogram equalisation (3.2-3.5): frame by frame makes the background flicker, frozen keeps the first table."),
+          "Histogram equalisation (3.2-3.5): frame by frame makes the background flicker, frozen keeps the first "
+          "table."),
 
       key("background.method", p.background.method,
           {{"adaptive", ForegroundMethod::kAdaptive}, {"edges", ForegroundMethod::kEdges}},
@@ -84,8 +85,7 @@ std::vector<Key> keys_of(Configuration& c) {
           "Distance that some pixels of an object must reach."),
       key("foreground.halo_percent", p.foreground.halo_percent, 0, 90, "%",
           "Pixels weaker than this part of a strong neighbour are its blur, not object: higher gives tighter boxes."),
-      key("foreground.min_seeds", p.foreground.min_seeds, 1, 10000, "px",
-          "Pixels over high_sd that an object needs."),
+      key("foreground.min_seeds", p.foreground.min_seeds, 1, 10000, "px", "Pixels over high_sd that an object needs."),
 
       key("shape.edge_threshold", p.shape.edge_threshold, 1, 255, "grey levels",
           "Edge strength from which a pixel is an edge (3.12); only with background.method = edges."),
@@ -118,13 +118,15 @@ std::vector<Key> keys_of(Configuration& c) {
           {{"stereo", ShadowMethod::kStereo}, {"chroma", ShadowMethod::kChroma}, {"off", ShadowMethod::kOff}},
           "Shadow test: the background's own disparity first, the document's chroma test alone (3.20-3.23), or none."),
       key("shadow.darkest_percent", p.shadow.test.darkest_percent, 1, 99, "%",
-          "Darkest light of a shadow, in percent of the lit background: lower removes deeper shadows, and dark objects."),
+          "Darkest light of a shadow, in percent of the lit background: lower removes deeper shadows, and dark "
+          "objects."),
       key("shadow.chroma_tolerance", p.shadow.test.chroma_tolerance, 0, 255, "grey levels",
           "How much a shadow may change Cb and Cr."),
       key("shadow.texture_tolerance", p.shadow.test.texture_tolerance, 0, 255, "grey levels",
           "How much a shadow may change the background's own texture."),
       key("shadow.weak_percent", p.shadow.test.weak_percent, 0, 90, "%",
-          "Parts of a region that stand out less than this part of the region do, and show the background's texture, are "
+          "Parts of a region that stand out less than this part of the region do, and show the background's texture, "
+          "are "
           "its reflection or haze; 0: off."),
       key("shadow.disparity_px", p.shadow.test.disparity_px, 0, 16, "px",
           "Disparities this near count as the background's own."),

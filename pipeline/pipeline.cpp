@@ -225,8 +225,6 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   const Detector::Input objects{.blobs = blobs_.blobs,
                                 .labels = blobs_.labels,
                                 .disparity = disparity_,
-                                .background_disparity = old_disparity_,
-                                .own_depth_px = config_.shadow.method == ShadowMethod::kStereo ? config_.shadow.own_depth_px : 0,
                                 .y = left_.y,
                                 .cb = left_.cb,
                                 .cr = left_.cr,
@@ -500,7 +498,7 @@ void Pipeline::reject_background() noexcept {
     if (known * 100 < blob.area * kEvidencePercent) continue;
     const bool ghost = sum.behind * 100 >= known * kVerdictPercent;
     const bool surface = (sum.own + sum.behind) * 100 >= known * kVerdictPercent;
-    if (!surface) continue;
+    if (!ghost && !(surface && resembles_background(blob.box, blob.label, blob.area))) continue;
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
       blobs_.labels.at(x, y) = 0;
       if (ghost) moving_.at(x, y) = AdaptiveBackground::kForget;
@@ -537,6 +535,7 @@ void Pipeline::remove_shadows() noexcept {
     if (blob.area > 0) ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];
   }
   (void)opening_->run(left_.mask, scratch_);
+  if (background_left_) (void)contour_fill_->run(scratch_, scratch_);
   if (const auto blobs = blob_extractor_->run(scratch_); blobs.has_value()) blobs_ = *blobs;
   if (config_.shadow.method == ShadowMethod::kStereo) reject_background();
 }
@@ -546,8 +545,8 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
   if (!region_matcher_) return;
   const bool sparse = !candidate.has_depth || candidate.valid * 4 < candidate.area;
   const bool small = candidate.area <= config_.disparity.small_px;
-  const bool unknown = candidate.claim < 0 && background_right_ && config_.shadow.method == ShadowMethod::kStereo;
-  if (!sparse && !small && !unknown) return;
+  const bool judges_surface = background_right_ && config_.shadow.method == ShadowMethod::kStereo;
+  if (!sparse && !small && !judges_surface) return;
   const Rect roi = paint_on_canvas(candidate.box, candidate.label);
   if (roi.empty()) return;
   DisparityRange range{0, full_range_};
@@ -576,14 +575,33 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
       candidate.scatter = 0.5;
     }
   }
-  // A light, or a mark on a surface, has the disparity that the same place of the background has.
-  if (unknown && candidate.has_depth) {
-    const RegionMatch before = match(left_.background_canvas, right_.background_canvas, {});
-    const double limit = std::max(config_.shadow.own_depth_px, 2 * candidate.disparity_sd);
-    if (before.found && config_.shadow.own_depth_px > 0 && candidate.disparity - before.disparity_px <= limit) {
-      candidate.own_surface = true;
+  if (candidate.has_depth && judges_surface && resembles_background(candidate.box, candidate.label, candidate.area)) {
+    // What the same place of the background measures: pixel by pixel, or matched as a whole.
+    std::int64_t sum = 0;
+    int known = 0;
+    for_each_pixel(blobs_.labels, candidate.box, candidate.label, [&](int x, int y) {
+      if (old_disparity_.at(x, y) == kNoDisparity) return;
+      sum += old_disparity_.at(x, y);
+      ++known;
+    });
+    double before = -1;
+    if (known * 3 >= candidate.area) {
+      before = static_cast<double>(sum) / known / kDisparityScale;
+    } else if (const RegionMatch whole = match(left_.background_canvas, right_.background_canvas, {}); whole.found) {
+      before = whole.disparity_px;
     }
+    const double limit = std::max(config_.shadow.own_depth_px, 2.5 * candidate.disparity_sd);
+    candidate.own_surface = before >= 0 && candidate.disparity - before <= limit;
   }
+}
+
+// Half of the region's pixels look like the background under another light.
+bool Pipeline::resembles_background(const Rect& box, std::uint16_t label, int area) const noexcept {
+  const ShadowTest::Input in = shadow_input();
+  int alike = 0;
+  for_each_pixel(blobs_.labels, box, label,
+                 [&](int x, int y) { alike += shadow_test_->resembles_background(in, x, y) ? 1 : 0; });
+  return alike * 2 >= area;
 }
 
 void Pipeline::learn_background() noexcept {

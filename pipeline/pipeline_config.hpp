@@ -45,7 +45,7 @@ struct ShapeConfig {
   int edge_threshold = 60;     ///< (3.12) on the Sobel magnitude of the difference [grey levels], 1..255
   int opening = 1;             ///< 3x3 openings, 0..10
   int closing = 1;             ///< 3x3 closings, 0..10
-  int hole_px = 400;           ///< holes up to this area are filled, 0..10^6 [px]; kEdges fills all
+  int hole_px = 3000;           ///< holes up to this area are filled, 0..10^6 [px]; kEdges fills all
   int max_blobs = 128;         ///< 1..1024
   int min_blob_px = 20;        ///< smaller blobs are not looked at, 1..10^6 [px]
   bool level_set = false;      ///< refine each blob's region by the level set
@@ -64,7 +64,7 @@ struct DisparityConfig {
 struct ShadowConfig {
   ShadowMethod method = ShadowMethod::kStereo;
   ShadowTest::Config test;
-  double own_depth_px = 0.6;  ///< a region this near to the background's own disparity is none, 0..16 [px]
+  double own_depth_px = 1.0;  ///< a region this near to the background's own disparity is none, 0..16 [px]
 };
 
 /// What every stage is told. The defaults are the robust preset.

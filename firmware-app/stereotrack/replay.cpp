@@ -98,7 +98,8 @@ class Replay {
     if (!info.stereo) messages_ << info.name << ": mono source, 2-D tracks without distance\n";
     if (arguments_.frames.first > 1) rig_.source->skip_to(arguments_.frames.first - 1);
     std::optional<std::uint64_t> expected;
-    if (info.pairs) expected = std::min(*info.pairs, arguments_.frames.last) - std::min(*info.pairs, arguments_.frames.first - 1);
+    if (info.pairs)
+      expected = std::min(*info.pairs, arguments_.frames.last) - std::min(*info.pairs, arguments_.frames.first - 1);
     Progress progress(messages_, expected);
     FramePair pair;
     while (!interrupted()) {
@@ -139,12 +140,12 @@ class Replay {
   void print(std::ostream& out) const {
     char line[256];
     const auto whole = times_.whole();
-    (void)std::snprintf(line, sizeof line,
-                        "%llu pairs, %llu skipped, %llu tracks, %llu rows; pipeline p50 %.2f ms, p99 %.2f ms, max %.2f ms\n",
-                        static_cast<unsigned long long>(summary_.frames),
-                        static_cast<unsigned long long>(summary_.skipped),
-                        static_cast<unsigned long long>(tracks_.tracks()),
-                        static_cast<unsigned long long>(tracks_.rows()), whole.p50_ms, whole.p99_ms, whole.max_ms);
+    (void)std::snprintf(
+        line, sizeof line,
+        "%llu pairs, %llu skipped, %llu tracks, %llu rows; pipeline p50 %.2f ms, p99 %.2f ms, max %.2f ms\n",
+        static_cast<unsigned long long>(summary_.frames), static_cast<unsigned long long>(summary_.skipped),
+        static_cast<unsigned long long>(tracks_.tracks()), static_cast<unsigned long long>(tracks_.rows()),
+        whole.p50_ms, whole.p99_ms, whole.max_ms);
     out << line;
     out << "rejected candidates:";
     for (std::size_t i = 0; i < kRejections; ++i) {
@@ -195,8 +196,8 @@ class Replay {
   }
 
   void publish(const FramePair& pair, const FrameResult& result) {
-    const auto latency = std::chrono::nanoseconds(
-        static_cast<std::int64_t>(rig_.configuration().latency.output_ms * 1e6 + 0.5));
+    const auto latency =
+        std::chrono::nanoseconds(static_cast<std::int64_t>(rig_.configuration().latency.output_ms * 1e6 + 0.5));
     telemetry::Message message;
     message.tracks = result.tracks;
     message.ordinal = pair.ordinal;
@@ -272,7 +273,8 @@ int run_masks(const MasksArguments& arguments, std::ostream& messages) {
     } else {
       const Result<FrameResult> result = pipeline.run(pair);
       if (!result.has_value()) {
-        throw std::runtime_error(info.name + ": pair " + std::to_string(pair.ordinal) + ": " + to_string(result.error()));
+        throw std::runtime_error(info.name + ": pair " + std::to_string(pair.ordinal) + ": " +
+                                 to_string(result.error()));
       }
       for (int y = 0; y < info.height; ++y) std::copy_n(result->mask.row(y), info.width, picture.ptr(y));
     }

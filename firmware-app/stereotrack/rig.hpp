@@ -15,10 +15,10 @@ namespace stereotrack {
 
 /// What the user said on the command line about where pictures come from and how to look at them.
 struct RigArguments {
-  std::string source;                        ///< SOURCE
-  std::optional<std::string> calibration;    ///< --calibration; else the source's own folder is asked
-  std::optional<std::string> config;         ///< --config; else stereotrack.toml in the source's folder
-  std::vector<std::string> set;              ///< --set KEY=VALUE, in order
+  std::string source;                      ///< SOURCE
+  std::optional<std::string> calibration;  ///< --calibration; else the source's own folder is asked
+  std::optional<std::string> config;       ///< --config; else stereotrack.toml in the source's folder
+  std::vector<std::string> set;            ///< --set KEY=VALUE, in order
 };
 
 /// Ordinals from `first` to `last`, both included.

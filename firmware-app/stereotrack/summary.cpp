@@ -41,7 +41,8 @@ void Digest::add(const Picture& picture) noexcept {
                                           static_cast<std::uint32_t>(picture.height),
                                           static_cast<std::uint32_t>(picture.format)};
   add(std::as_bytes(std::span(head)));
-  const auto row_bytes = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(bytes_per_pixel(picture.format));
+  const auto row_bytes =
+      static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(bytes_per_pixel(picture.format));
   for (int y = 0; y < picture.height; ++y) add(std::as_bytes(std::span(picture.row(y), row_bytes)));
 }
 

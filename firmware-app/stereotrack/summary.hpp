@@ -53,12 +53,12 @@ class StageTimes {
 /// summary.json: what a run was and did.
 struct Summary {
   std::string source;
-  std::uint64_t frames = 0;   ///< pairs that went through the pipeline
-  std::uint64_t skipped = 0;  ///< pairs that could not be read
+  std::uint64_t frames = 0;               ///< pairs that went through the pipeline
+  std::uint64_t skipped = 0;              ///< pairs that could not be read
   std::vector<std::string> skip_reasons;  ///< the first hundred
-  std::uint64_t tracks = 0;   ///< confirmed ones
-  std::uint64_t rows = 0;     ///< of tracks.csv
-  std::uint32_t flags = 0;    ///< FrameFlag bits of all frames together
+  std::uint64_t tracks = 0;               ///< confirmed ones
+  std::uint64_t rows = 0;                 ///< of tracks.csv
+  std::uint32_t flags = 0;                ///< FrameFlag bits of all frames together
   RejectionCounts rejections{};
   std::uint64_t deadline_misses = 0;
   std::uint64_t telemetry_sent = 0;

@@ -174,9 +174,8 @@ void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8
       }
       if (mask.at(x, y) == 0) {
         const int rate = std::min(age + 1, config_.window);
-        each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
-          blend(channel, x, y, plane.at(x, y), rate);
-        });
+        each_channel(
+            [&](Channel& channel, ImageView<const std::uint8_t> plane) { blend(channel, x, y, plane.at(x, y), rate); });
         age = static_cast<std::uint16_t>(std::min(age + 1, absorb));
         if (candidate_age > 0) --candidate_age;
         continue;

@@ -33,11 +33,11 @@ class AdaptiveBackground {
   static constexpr int kStepsPerSd = 4;  ///< of distance()
 
   struct Config {
-    int window = 60;            ///< frames of the exponential window, 2..1024
-    int absorb_frames = 300;    ///< frames after which what stands still is background, 2..60000
-    int noise_floor = 256;      ///< added to the standard deviation [1/256 grey level], 1..4096
-    int edge_percent = 75;      ///< e: tolerated shift of an edge [% of the 3x3 range], 0..200
-    int relearn_percent = 60;   ///< part of the picture that must change at once to start anew, 1..100
+    int window = 60;           ///< frames of the exponential window, 2..1024
+    int absorb_frames = 300;   ///< frames after which what stands still is background, 2..60000
+    int noise_floor = 256;     ///< added to the standard deviation [1/256 grey level], 1..4096
+    int edge_percent = 75;     ///< e: tolerated shift of an edge [% of the 3x3 range], 0..200
+    int relearn_percent = 60;  ///< part of the picture that must change at once to start anew, 1..100
   };
 
   /// colour: whether Cb and Cr are given. Faults: kBadConfig, kBadSize, kOutOfMemory.

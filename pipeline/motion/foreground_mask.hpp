@@ -16,7 +16,8 @@ namespace stereotrack {
 ///    largest distance within 2 px is rim, not object;
 /// 3. a pixel stays if most of its 3x3 neighbourhood are candidates, which removes single noisy pixels;
 /// 4. components without enough seeds go: weak pixels count only where they hang on strong ones.
-/// In: distance, u8, AdaptiveBackground::kStepsPerSd a standard deviation. Out: 0 or 255, same size. O(pixels). One instance a thread.
+/// In: distance, u8, AdaptiveBackground::kStepsPerSd a standard deviation. Out: 0 or 255, same size. O(pixels). One
+/// instance a thread.
 class ForegroundMask {
  public:
   struct Config {

@@ -34,7 +34,7 @@ Result<ShadowTest> ShadowTest::create(const Config& config, int width, int heigh
   return self;
 }
 
-bool ShadowTest::looks_like_background(const Input& in, int x, int y) const noexcept {
+bool ShadowTest::looks_like_background(const Input& in, int x, int y, int slack) const noexcept {
   int now = 0;
   int before = 0;
   int count = 0;
@@ -47,16 +47,17 @@ bool ShadowTest::looks_like_background(const Input& in, int x, int y) const noex
   const int ratio = static_cast<int>(static_cast<std::int64_t>(now) * 256 / before);
   const std::uint16_t label = in.labels.at(x, y);
   const bool weak = in.distance.at(x, y) * 100 < in.typical[label] * config_.weak_percent;
-  const bool darker = ratio * 100 >= config_.darkest_percent * 256 && ratio * 100 < kBrightestPercent * 256;
-  if (!weak && !darker) return false;
+  const bool darker = ratio * 100 * slack >= config_.darkest_percent * 256 && ratio * 100 < kBrightestPercent * 256;
+  const bool lit = slack > 1 && ratio < 2 * 256;  // stereo has spoken: it may be brighter, too
+  if (!weak && !darker && !lit) return false;
   int residual = 0;
   for_each_neighbour(x, y, verdicts_.width, verdicts_.height, [&](int u, int v) {
     residual += std::abs(in.y.at(u, v) * 256 - in.y_background.at(u, v) * ratio);
   });
-  if (residual > (config_.texture_tolerance * 256) * count) return false;
+  if (residual > (config_.texture_tolerance * 256 * slack) * count) return false;
   if (weak || in.cb.empty()) return true;
   const auto chroma_kept = [&](int value, int background) {
-    return std::abs((value - 128) * 256 - (background - 128) * ratio) <= config_.chroma_tolerance * 256;
+    return std::abs((value - 128) * 256 - (background - 128) * ratio) <= config_.chroma_tolerance * 256 * slack;
   };
   return chroma_kept(in.cb.at(x, y), in.cb_background.at(x, y)) &&
          chroma_kept(in.cr.at(x, y), in.cr_background.at(x, y));
@@ -85,10 +86,10 @@ ShadowTest::Verdict ShadowTest::judge(const Input& in, int x, int y) const noexc
   switch (depth_of(in, x, y)) {
     case Depth::kNear: return kObject;
     case Depth::kBehind: return kBackground;
-    case Depth::kOwn:
+    case Depth::kOwn: return looks_like_background(in, x, y, kOwnSlack) ? kBackground : kObject;
     case Depth::kUnknown: break;
   }
-  return looks_like_background(in, x, y) ? kBackground : kObject;
+  return looks_like_background(in, x, y, 1) ? kBackground : kObject;
 }
 
 std::uint32_t ShadowTest::run(const Input& in, ImageView<std::uint8_t> mask) noexcept {

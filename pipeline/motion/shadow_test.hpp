@@ -15,7 +15,8 @@ namespace stereotrack {
 ///     d - d_b > disparity_px       nearer than the background: object, whatever it looks like
 ///     d_b - d > disparity_px       behind it, where nothing can be: the background holds something that has
 ///                                  left, a ghost
-///     else                         the background's own surface: shadow if it looks so, else undecided
+///     else                         the background's own surface: shadow if it looks so, the tolerances below
+///                                  taken three times as wide
 /// Photometric evidence, where stereo says nothing or "own surface". With r the ratio of the lights over 5x5,
 /// r = sum Y / sum Y_background:
 ///     darkest_percent / 100 <= r < 0.97                      darker, not black
@@ -67,14 +68,22 @@ class ShadowTest {
   /// Clears the pixels of `mask` (255 = foreground) that are shadow or light; returns how many.
   std::uint32_t run(const Input& in, ImageView<std::uint8_t> mask) noexcept;
 
+  /// Whether the pixel looks like the background under another light, darker or brighter, with the wide tolerances:
+  /// to be asked where stereo has said that the surface is the background's own.
+  [[nodiscard]] bool resembles_background(const Input& in, int x, int y) const noexcept {
+    return looks_like_background(in, x, y, kOwnSlack);
+  }
+
   /// Stereo evidence at one pixel, added to `sum`.
   void weigh(const Input& in, int x, int y, Evidence& sum) const noexcept;
 
  private:
+  static constexpr int kOwnSlack = 3;  // tolerances where the surface is known to be the background's own
+
   enum Verdict : std::uint8_t { kOutside = 0, kObject = 1, kBackground = 2 };
   enum class Depth : std::uint8_t { kUnknown, kNear, kOwn, kBehind };
   [[nodiscard]] Depth depth_of(const Input& in, int x, int y) const noexcept;
-  [[nodiscard]] bool looks_like_background(const Input& in, int x, int y) const noexcept;
+  [[nodiscard]] bool looks_like_background(const Input& in, int x, int y, int slack) const noexcept;
   [[nodiscard]] Verdict judge(const Input& in, int x, int y) const noexcept;
 
   Config config_;

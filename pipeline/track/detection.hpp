@@ -31,13 +31,19 @@ struct Detection {
 struct Prediction {
   std::uint32_t id = 0;
   bool confirmed = false;
+  std::uint64_t apart = 0;   ///< bit id % 64 of each target that was seen beside this one, each a region of its own
   bool independent = false;  ///< has been seen as a region of its own, not only cut out of another's
   Rect box;                 ///< expected box, raw left picture, may reach outside [px]
+  double vx = 0;            ///< velocity of its centre in the picture [px/s]
+  double vy = 0;
   double image_sd = 0;      ///< standard deviation of its centre, the larger axis [px]
   bool has_depth = false;
   double disparity = 0;     ///< [px]
   double disparity_sd = 0;  ///< from the state's covariance [px]
   std::array<std::uint8_t, 3> colour{};
+
+  [[nodiscard]] static std::uint64_t bit(std::uint32_t id) noexcept { return std::uint64_t{1} << (id % 64); }
+  [[nodiscard]] bool seen_beside(const Prediction& other) const noexcept { return (apart & bit(other.id)) != 0; }
 };
 
 }  // namespace stereotrack

@@ -26,6 +26,8 @@ constexpr double kLeastDisparitySd = 0.10;
 
 double square(double value) noexcept { return value * value; }
 
+double length(double x, double y) noexcept { return std::sqrt(x * x + y * y); }
+
 int gap(const Rect& a, const Rect& b) noexcept {
   const int across = std::max({a.left - b.right(), b.left - a.right(), 0});
   const int down = std::max({a.top - b.bottom(), b.top - a.bottom(), 0});
@@ -89,10 +91,13 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
     layer.disparity_sd = target.disparity_sd + config_.match_noise_px + 0.25 * config_.split_depth * target.disparity;
     layer.claim = static_cast<int>(k);
     layer.fit = overlap(expected, blob.box);
-    // Two targets at one place and depth are one object seen twice: the one that fits the blob better claims it.
+    // Two targets at one place and depth that were never seen side by side are one object followed twice: the one
+    // that fits the blob better claims it.
     bool rival = false;
     for (Layer& other : layers_) {
-      const Rect& box = in.predictions[static_cast<std::size_t>(other.claim)].box;
+      const Prediction& rival_target = in.predictions[static_cast<std::size_t>(other.claim)];
+      if (rival_target.seen_beside(target)) continue;
+      const Rect& box = rival_target.box;
       const auto lesser = static_cast<double>(std::min(box.area(), target.box.area()));
       if (static_cast<double>(intersect(box, target.box).area()) < kNestedPart * lesser) continue;
       if (other.has_depth && layer.has_depth &&
@@ -308,13 +313,21 @@ bool Detector::belong_together(const Input& in, const Candidate& a, const Candid
   const int claim_a = claim_of(in, a);
   const int claim_b = claim_of(in, b);
   if (claim_a >= 0 && claim_a == claim_b) return true;
-  if (claim_a >= 0 && claim_b >= 0) return false;
   if (a.has_depth && b.has_depth) {
     const double nearer = std::max(a.disparity, b.disparity);
     const double apart = std::abs(a.disparity - b.disparity);
     if (apart > std::max(config_.merge_depth * nearer, 1.0) + 2 * std::min(a.disparity_sd + b.disparity_sd, 2.0)) {
       return false;
     }
+  }
+  if (claim_a >= 0 && claim_b >= 0) {
+    const int across = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
+    if (across * 2 < std::min(a.box.width, b.box.width)) return false;
+    const Prediction& first = in.predictions[static_cast<std::size_t>(claim_a)];
+    const Prediction& second = in.predictions[static_cast<std::size_t>(claim_b)];
+    const double speed = std::max(length(first.vx, first.vy), length(second.vx, second.vy));
+    const double size = std::max({a.box.width, a.box.height, b.box.width, b.box.height});
+    if (length(first.vx - second.vx, first.vy - second.vy) > 0.4 * speed + 0.2 * size) return false;
   }
   const Rect& larger = a.area >= b.area ? a.box : b.box;
   return gap(a.box, b.box) <= config_.merge_gap * std::max(larger.width, larger.height);
@@ -373,21 +386,6 @@ std::span<Detector::Candidate> Detector::segment(const Input& in) noexcept {
   candidates_.truncate(kept);
   for (Candidate& candidate : candidates_) candidate.claim = claim_of(in, candidate);
   return {candidates_.begin(), candidates_.size()};
-}
-
-// Median of (its disparity - the background's) over its pixels; a third of them must tell.
-bool Detector::on_own_surface(const Input& in, const Candidate& candidate) noexcept {
-  if (in.background_disparity.empty() || !(in.own_depth_px > 0) || !candidate.has_depth) return false;
-  int known = 0;
-  int near = 0;
-  const double limit = candidate.disparity - in.own_depth_px;
-  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
-    const std::uint16_t background = in.background_disparity.at(x, y);
-    if (background == kNoDisparity) return;
-    ++known;
-    if (background / static_cast<double>(kDisparityScale) < limit) ++near;
-  });
-  return known * 3 >= candidate.area && near * 2 < known;
 }
 
 bool Detector::describe(const Input& in, const Candidate& candidate, Detection& out) noexcept {
@@ -463,7 +461,7 @@ std::span<const Detection> Detector::conclude(const Input& in) noexcept {
       reject(Rejection::kInconsistent);
       continue;
     }
-    if (candidate.own_surface || (!known && on_own_surface(in, candidate))) {
+    if (candidate.own_surface) {
       reject(Rejection::kOwnSurface);
       continue;
     }

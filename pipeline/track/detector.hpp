@@ -39,7 +39,8 @@ using RejectionCounts = std::array<std::uint32_t, kRejections>;
 ///     cost = ((x - x_t) / w_t)^2 + ((y - y_t) / h_t)^2 + ((d - d_t) / s_t)^2,
 /// else a blob whose disparities form layers with a gap of split_depth between them is split into the layers.
 /// Merge: pieces that one confirmed target explains, or that are close in the picture (merge_gap) and in depth
-/// (merge_depth) and not claimed by different confirmed targets, are one object.
+/// (merge_depth) and not claimed by different confirmed targets, are one object. So are two confirmed targets
+/// one above the other, at one depth and of one motion: an object that had come apart.
 /// Depth of a piece: median of its disparities; its scatter is the median absolute deviation; its position the
 /// mean of its pixels' points (pixels without disparity take the median).
 ///
@@ -67,8 +68,6 @@ class Detector {
     std::span<const Blob> blobs;
     ImageView<std::uint16_t> labels;  ///< of the blobs; receives label i + 1 for detection i, 0 elsewhere
     ImageView<const std::uint16_t> disparity;  ///< 1/16 px in the raw left picture, empty for mono
-    ImageView<const std::uint16_t> background_disparity;  ///< the background's own, where known; may be empty
-    double own_depth_px = 0;  ///< objects this near to the background's own disparity are none [px], 0 = off
     ImageView<const std::uint8_t> y;
     ImageView<const std::uint8_t> cb;  ///< empty for grey
     ImageView<const std::uint8_t> cr;
@@ -125,7 +124,6 @@ class Detector {
   void merge(const Input& in) noexcept;
   [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
   [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept;
-  [[nodiscard]] bool on_own_surface(const Input& in, const Candidate& candidate) noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
   void reject(Rejection why) noexcept { ++rejections_[static_cast<std::size_t>(why)]; }
 

@@ -85,7 +85,8 @@ double Features::corner_strength(ImageView<const std::uint8_t> luma, int x, int 
 }
 
 void Features::follow(ImageView<const std::uint8_t> luma, double dt, double acceleration_sd, Set& set) const noexcept {
-  const ConstantVelocityFilter<2>::Matrix R = ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
+  const ConstantVelocityFilter<2>::Matrix R =
+      ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
   Set kept;
   for (Feature& feature : set) {
     feature.filter.predict(dt, acceleration_sd);
@@ -140,18 +141,18 @@ void Features::refill(ImageView<const std::uint8_t> luma, ImageView<const std::u
   if (inside.empty() || set.size() == Set::capacity()) return;
   for (int y = inside.top; y < inside.bottom(); ++y) {
     for (int x = inside.left; x < inside.right(); ++x) {
-      strength_.at(x, y) = labels.at(x, y) == label && patch_fits(luma, x, y)
-                               ? static_cast<float>(corner_strength(luma, x, y))
-                               : 0.0F;
+      strength_.at(x, y) =
+          labels.at(x, y) == label && patch_fits(luma, x, y) ? static_cast<float>(corner_strength(luma, x, y)) : 0.0F;
     }
   }
   const auto clear_around = [&](double px, double py) {
-    const Rect taken = intersect(inside, {static_cast<int>(px) - kPatch, static_cast<int>(py) - kPatch, 2 * kPatch + 1,
-                                          2 * kPatch + 1});
+    const Rect taken = intersect(
+        inside, {static_cast<int>(px) - kPatch, static_cast<int>(py) - kPatch, 2 * kPatch + 1, 2 * kPatch + 1});
     for (int y = taken.top; y < taken.bottom(); ++y) std::fill_n(&strength_.at(taken.left, y), taken.width, 0.0F);
   };
   for (const Feature& feature : set) clear_around(feature.filter.position().x(), feature.filter.position().y());
-  const ConstantVelocityFilter<2>::Matrix R = ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
+  const ConstantVelocityFilter<2>::Matrix R =
+      ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
   while (set.size() < Set::capacity()) {
     auto best = static_cast<float>(config_.corner_quality);
     Point where{-1, -1};

@@ -23,8 +23,8 @@ namespace stereotrack {
 /// not matter), over all integer positions of the window; then a parabola each way for the sub-pixel.
 class Features {
  public:
-  static constexpr int kPatch = 9;     ///< side of a patch [px]
-  static constexpr int kMost = 12;     ///< features a target
+  static constexpr int kPatch = 9;  ///< side of a patch [px]
+  static constexpr int kMost = 12;  ///< features a target
 
   struct Config {
     int corner_quality = 400;  ///< smallest eigenvalue of a corner [grey levels^2 per pixel of gradient], 1..1e6

@@ -70,6 +70,9 @@ std::span<const Prediction> Tracker::predict(double dt) noexcept {
     Prediction prediction;
     prediction.id = target.id;
     prediction.confirmed = target.state != TrackState::kTentative;
+    prediction.vx = target.image.velocity().x();
+    prediction.vy = target.image.velocity().y();
+    prediction.apart = target.apart;
     prediction.independent = target.whole_hits >= config_.confirm_hits;
     const Vector2 centre = target.image.position();
     prediction.box = {static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
@@ -167,6 +170,7 @@ void Tracker::measure(Target& target, const Detection& detection) noexcept {
   target.misses_in_a_row = 0;
   target.unseen_s = 0;
   ++target.hits;
+  target.whole = detection.whole;
   if (detection.whole) ++target.whole_hits;
   const double rate = target.hits < 5 ? 1.0 / target.hits : kAppearanceRate;
   target.width += (detection.box.width - target.width) * rate;
@@ -188,6 +192,7 @@ void Tracker::measure(Target& target, const Detection& detection) noexcept {
 }
 
 void Tracker::miss(Target& target) noexcept {
+  target.whole = false;
   target.measured = false;
   ++target.misses_in_a_row;
   target.quality *= 0.9;
@@ -218,6 +223,7 @@ void Tracker::start(const Detection& detection) noexcept {
   target.box = detection.box;
   target.hull = detection.hull;
   target.hits = 1;
+  target.whole = detection.whole;
   target.whole_hits = detection.whole ? 1 : 0;
   target.measured = true;
   target.image.start(Vector2(target.first_x, target.first_y), centre_noise(config_, detection.box),
@@ -273,6 +279,9 @@ void Tracker::update(std::span<const Detection> detections) noexcept {
   for (std::size_t j = 0; j < detections.size(); ++j) {
     if (detection_used_[j] == 0) start(detections[j]);
   }
+  std::uint64_t whole = 0;
+  for (const Target& target : targets_) whole |= target.whole ? Prediction::bit(target.id) : 0;
+  for (Target& target : targets_) target.apart |= target.whole ? whole : 0;
   report();
 }
 

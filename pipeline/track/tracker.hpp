@@ -78,6 +78,8 @@ class Tracker {
     bool measured;
     bool has_depth;
     int hits;
+    std::uint64_t apart;  // see Prediction
+    bool whole;           // measured in this frame, as a region of its own
     int whole_hits;  // detections that were regions of their own
     int misses_in_a_row;
     int frames;

@@ -435,6 +435,12 @@ void View::expose(const LightLevel& level, const Sensor& sensor, std::uint64_t f
 
 View::Owner View::owner(int x, int y) const noexcept {
   const std::size_t pixel = index(x, y);
+  const auto still = [&] {
+    const float depth = center_depth_[pixel];
+    return Owner{-1, depth < kSkyDepth ? 1.0 / static_cast<double>(depth) : 0.0};
+  };
+  const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
+  if (x < first || x >= last) return still();
   std::array<int, kSamples> actor{};
   for (std::size_t s = 0; s < kSamples; ++s) {
     const std::uint16_t who = who_[kSamples * pixel + s];
@@ -455,11 +461,7 @@ View::Owner View::owner(int x, int y) const noexcept {
       best = {actor[s], inverse / votes};
     }
   }
-  if (best.actor < 0) {
-    const float depth = center_depth_[pixel];
-    best.inverse_depth = depth < kSkyDepth ? 1.0 / static_cast<double>(depth) : 0.0;
-  }
-  return best;
+  return best.actor < 0 ? still() : best;
 }
 
 double View::darkening(int x, int y) const noexcept {

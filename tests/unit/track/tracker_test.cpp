@@ -1,0 +1,445 @@
+#include "pipeline/track/tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <random>
+#include <vector>
+
+namespace stereotrack {
+namespace {
+
+constexpr double kFps = 25;
+constexpr double kDt = 1 / kFps;
+constexpr double kFocal = 500;
+constexpr double kFocalBaseline = 100;  // f b: 20 px of disparity at 5 m
+constexpr int kWidth = 640;
+constexpr int kHeight = 480;
+
+Tracker::Config config() {
+  Tracker::Config c;
+  c.confirm_hits = 3;
+  c.tentative_misses = 2;
+  c.coast_s = 1;
+  c.gate = 4;
+  c.acceleration = 1.5;
+  c.initial_speed = 2;
+  c.centre_noise_px = 0.7;
+  c.centre_noise_size = 0.05;
+  c.travel_px = 3;
+  c.straight_part = 0.4;
+  return c;
+}
+
+/// A box of 24 x 24 around (x, y); disparity 0: not seen by stereo.
+Detection seen_at(double x, double y, double disparity = 0) {
+  Detection out;
+  out.box = {static_cast<int>(std::lround(x)) - 12, static_cast<int>(std::lround(y)) - 12, 24, 24};
+  out.area = 450;
+  out.colour = {120, 128, 128};
+  out.strength = 0.5;
+  (void)out.hull.push({out.box.left, out.box.top});
+  if (disparity <= 0) return out;
+  out.has_depth = true;
+  out.disparity = disparity;
+  out.disparity_sd = 0.2;
+  const double z = kFocalBaseline / disparity;
+  out.position = {(x - kWidth / 2.0) * z / kFocal, (y - kHeight / 2.0) * z / kFocal, z};
+  const double across = z / kFocal;
+  const double along = z / disparity * 0.2;
+  out.position_covariance = Eigen::Vector3d(across * across, across * across, along * along).asDiagonal();
+  return out;
+}
+
+class TrackerOf : public testing::Test {
+ protected:
+  void SetUp() override { make(config()); }
+  void make(const Tracker::Config& c, double focal_baseline = kFocalBaseline) {
+    auto created = Tracker::create(c, {kWidth, kHeight, kFocal, focal_baseline}, arena_);
+    ASSERT_TRUE(created.has_value());
+    tracker.emplace(*created);
+  }
+  void step(const std::vector<Detection>& detections, double dt = kDt) {
+    (void)tracker->predict(dt);
+    tracker->update(detections);
+  }
+  [[nodiscard]] std::span<const TrackReport> reports() const { return tracker->reports(); }
+  [[nodiscard]] int count(TrackState state) const {
+    return static_cast<int>(std::count_if(reports().begin(), reports().end(),
+                                          [&](const TrackReport& report) { return report.state == state; }));
+  }
+  /// The report whose centre is nearest.
+  [[nodiscard]] TrackReport at(double x, double y) const {
+    TrackReport best;
+    double least = 1e9;
+    for (const TrackReport& report : reports()) {
+      const double apart = std::hypot(report.image_x - x, report.image_y - y);
+      if (apart < least) {
+        least = apart;
+        best = report;
+      }
+    }
+    EXPECT_LT(least, 8) << "nobody near " << x << ' ' << y;
+    return best;
+  }
+
+  std::optional<Tracker> tracker;
+
+ private:
+  Arena arena_;
+};
+
+TEST_F(TrackerOf, NothingSeenIsNoTrack) {
+  EXPECT_TRUE(tracker->predict(kDt).empty());
+  tracker->update({});
+  EXPECT_TRUE(reports().empty());
+  EXPECT_EQ(tracker->refused(), 0U);
+}
+
+TEST_F(TrackerOf, StraightTargetIsConfirmedByConfirmHitsDetections) {
+  for (int hits : {2, 3, 6}) {
+    Tracker::Config c = config();
+    c.confirm_hits = hits;
+    make(c);
+    for (int k = 1; k <= hits + 3; ++k) {
+      step({seen_at(100 + 6 * k, 200 + 2 * k)});
+      ASSERT_EQ(reports().size(), 1U);
+      EXPECT_EQ(reports()[0].id, 1U);
+      EXPECT_TRUE(reports()[0].measured);
+      EXPECT_EQ(reports()[0].state, k < hits ? TrackState::kTentative : TrackState::kConfirmed) << hits << ' ' << k;
+    }
+  }
+}
+
+TEST_F(TrackerOf, ReportTellsWhereAndHowFast) {
+  // 4 m/s to the right and 2 m/s away, seen for a second.
+  for (int k = 0; k <= 25; ++k) {
+    const double t = k * kDt;
+    const double z = 5 + 2 * t;
+    step({seen_at(kWidth / 2.0 + (-2 + 4 * t) * kFocal / z, 240, kFocalBaseline / z)});
+  }
+  ASSERT_EQ(reports().size(), 1U);
+  const TrackReport& report = reports()[0];
+  EXPECT_TRUE(report.has_depth);
+  EXPECT_LT((report.position - Eigen::Vector3d(2, 0, 7)).norm(), 0.1);
+  EXPECT_LT((report.velocity - Eigen::Vector3d(4, 0, 2)).norm(), 0.5);
+  EXPECT_NEAR(report.image_x, kWidth / 2.0 + 2 * kFocal / 7, 2);
+  EXPECT_NEAR(report.image_y, 240, 1);
+  EXPECT_GT(report.image_vx, 150);
+  EXPECT_NEAR(report.age_s, 1, 1e-9);
+  EXPECT_GT(report.confidence, 0);
+  EXPECT_LE(report.confidence, 1);
+  EXPECT_EQ(report.covariance.llt().info(), Eigen::Success);
+}
+
+TEST_F(TrackerOf, FlickerInPlaceIsNeverConfirmed) {
+  std::mt19937 random(1);
+  Tracker::Config c = config();
+  c.travel_px = 6;
+  make(c);
+  for (int k = 0; k < 200; ++k) {
+    step({seen_at(300 + static_cast<double>(random() % 5), 200 + static_cast<double>(random() % 3), 20)});
+    ASSERT_EQ(count(TrackState::kConfirmed) + count(TrackState::kCoasting), 0) << k;
+  }
+  EXPECT_EQ(reports().size(), 1U) << "the flicker was not followed, so the test says nothing";
+}
+
+TEST_F(TrackerOf, FlickerToAndFroIsNotConfirmedThoughItsJumpsAreLong) {
+  for (int k = 0; k < 60; ++k) {
+    step({seen_at(300 + (k % 2 == 0 ? 0 : 10), 200)});
+    ASSERT_EQ(count(TrackState::kConfirmed) + count(TrackState::kCoasting), 0) << k;
+  }
+}
+
+TEST_F(TrackerOf, TargetComingStraightOnIsConfirmedByItsDistance) {
+  for (int k = 0; k < 12; ++k) step({seen_at(kWidth / 2.0, kHeight / 2.0, kFocalBaseline / (5 - 0.1 * k))});
+  EXPECT_EQ(count(TrackState::kConfirmed), 1);
+  make(config());
+  for (int k = 0; k < 12; ++k) step({seen_at(kWidth / 2.0, kHeight / 2.0, kFocalBaseline / 5)});
+  EXPECT_EQ(count(TrackState::kConfirmed), 0);
+}
+
+TEST_F(TrackerOf, TentativeTargetGoesAfterTentativeMisses) {
+  for (int misses : {1, 2, 4}) {
+    Tracker::Config c = config();
+    c.tentative_misses = misses;
+    make(c);
+    step({seen_at(100, 100)});
+    for (int k = 1; k < misses; ++k) {
+      step({});
+      EXPECT_EQ(reports().size(), 1U);
+    }
+    step({});
+    EXPECT_TRUE(reports().empty()) << misses;
+  }
+}
+
+TEST_F(TrackerOf, DoubledStepKeepsTheIdentity) {
+  // 14 px a frame; twice a frame is missing, and nothing tells.
+  double x = 60;
+  for (int k = 0; k < 30; ++k) {
+    x += k == 12 || k == 20 ? 28 : 14;
+    step({seen_at(x, 150, 25)});
+    ASSERT_EQ(reports().size(), 1U) << k;
+    EXPECT_EQ(reports()[0].id, 1U) << k;
+    EXPECT_TRUE(reports()[0].measured) << k;
+  }
+}
+
+TEST_F(TrackerOf, DetectionFarFromThePredictionIsAnotherTarget) {
+  for (int k = 0; k < 10; ++k) step({seen_at(100 + 5 * k, 150)});
+  step({seen_at(400, 150)});
+  ASSERT_EQ(reports().size(), 2U);
+  EXPECT_EQ(reports()[0].state, TrackState::kCoasting);
+  EXPECT_EQ(reports()[1].id, 2U);
+  EXPECT_EQ(reports()[1].state, TrackState::kTentative);
+}
+
+TEST_F(TrackerOf, DetectionAtAnotherDepthIsAnotherTarget) {
+  for (int k = 0; k < 10; ++k) step({seen_at(100 + 5 * k, 150, 20)});
+  step({seen_at(150, 150, 40)});
+  ASSERT_EQ(reports().size(), 2U);
+  EXPECT_FALSE(reports()[0].measured);
+}
+
+TEST_F(TrackerOf, OcclusionShorterThanCoastKeepsTheIdentity) {
+  const auto place = [](int k) { return seen_at(60 + 6 * k, 150, 20); };
+  for (int k = 0; k < 20; ++k) step({place(k)});
+  for (int k = 20; k < 44; ++k) {  // 0.96 s
+    step({});
+    ASSERT_EQ(reports().size(), 1U) << k;
+    EXPECT_EQ(reports()[0].state, TrackState::kCoasting);
+    EXPECT_FALSE(reports()[0].measured);
+    EXPECT_NEAR(reports()[0].image_x, 60 + 6 * k, 8) << "coasts along its path";
+  }
+  step({place(44)});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_EQ(reports()[0].id, 1U);
+  EXPECT_EQ(reports()[0].state, TrackState::kConfirmed);
+  EXPECT_TRUE(reports()[0].measured);
+}
+
+TEST_F(TrackerOf, OcclusionLongerThanCoastEndsTheTrack) {
+  for (int k = 0; k < 20; ++k) step({seen_at(60 + 3 * k, 150)});
+  for (int k = 0; k < 27; ++k) step({});
+  EXPECT_TRUE(reports().empty());
+  step({seen_at(60 + 3 * 47, 150)});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_EQ(reports()[0].id, 2U);
+}
+
+TEST_F(TrackerOf, CoastingTargetThatLeavesThePictureEnds) {
+  for (int k = 0; k < 20; ++k) step({seen_at(440 + 9 * k, 150)});
+  for (int k = 0; k < 12; ++k) step({});
+  EXPECT_TRUE(reports().empty());
+}
+
+TEST_F(TrackerOf, CoastIsTimeNotFrames) {
+  for (double dt : {0.01, 0.2}) {
+    make(config());
+    for (int k = 0; k < 20; ++k) step({seen_at(60 + 4 * k, 150)}, dt);
+    double unseen = 0;
+    while (!reports().empty() && unseen < 5) {
+      step({}, dt);
+      unseen += dt;
+    }
+    EXPECT_NEAR(unseen, 1, 1.01 * dt) << dt;
+  }
+}
+
+TEST_F(TrackerOf, CrossingTargetsOfDifferentDepthKeepTheirIdentities) {
+  for (int k = 0; k <= 60; ++k) {
+    const double near_x = 140 + 6 * k;
+    const double far_x = 500 - 6 * k;
+    std::vector<Detection> both{seen_at(near_x, 200, 40), seen_at(far_x, 202, 20)};
+    if (k % 3 == 1) std::swap(both[0], both[1]);
+    if (k >= 29 && k <= 31) both = {seen_at(near_x, 200, 40)};  // the near one hides the other
+    step(both);
+    if (k == 20) {
+      EXPECT_EQ(at(near_x, 200).id, 1U);
+      EXPECT_EQ(at(far_x, 202).id, 2U);
+    }
+  }
+  ASSERT_EQ(reports().size(), 2U);
+  EXPECT_EQ(at(500, 200).id, 1U);
+  EXPECT_EQ(at(140, 202).id, 2U);
+}
+
+TEST_F(TrackerOf, TargetsThatTurnRoundWhereTheyMeetAreToldApartByDepth) {
+  // The prediction says they cross; only the depth says they do not.
+  for (int k = 0; k <= 60; ++k) {
+    const double way = k <= 30 ? 4.0 * k : 4.0 * (60 - k);
+    step({seen_at(200 + way, 200, 40), seen_at(440 - way, 200, 20)});
+  }
+  ASSERT_EQ(reports().size(), 2U);
+  EXPECT_EQ(at(200, 200).id, 1U);
+  EXPECT_NEAR(at(200, 200).position.z(), kFocalBaseline / 40, 0.2);
+  EXPECT_EQ(at(440, 200).id, 2U);
+}
+
+TEST_F(TrackerOf, VelocityComesFromTheTimesNotFromTheFrames) {
+  std::mt19937 random(4);
+  double t = 0;
+  const auto place = [](double time) { return seen_at(80 + 150 * time, 300 - 50 * time, 20); };
+  step({place(0)}, 0);
+  for (int k = 0; k < 40; ++k) {
+    const double dt = 0.02 + 0.02 * static_cast<double>(random() % 5);
+    t += dt;
+    step({place(t)}, dt);
+  }
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_EQ(reports()[0].id, 1U);
+  EXPECT_NEAR(reports()[0].image_vx, 150, 15);
+  EXPECT_NEAR(reports()[0].image_vy, -50, 15);
+  EXPECT_NEAR(reports()[0].velocity.x(), 150 * 5 / kFocal, 0.15);  // 5 m away
+  EXPECT_NEAR(reports()[0].age_s, t, 1e-9);
+}
+
+TEST_F(TrackerOf, PredictionIsWhereTheTargetWillBe) {
+  for (int k = 0; k <= 25; ++k) step({seen_at(100 + 4 * k, 150, 20)});
+  const std::span<const Prediction> predictions = tracker->predict(5 * kDt);
+  ASSERT_EQ(predictions.size(), 1U);
+  const Prediction& prediction = predictions[0];
+  EXPECT_EQ(prediction.id, 1U);
+  EXPECT_TRUE(prediction.confirmed);
+  EXPECT_NEAR(prediction.box.left + 12, 220, 4);
+  EXPECT_NEAR(prediction.box.top + 12, 150, 2);
+  EXPECT_NEAR(prediction.box.width, 24, 1);
+  EXPECT_GT(prediction.image_sd, 0);
+  EXPECT_TRUE(prediction.has_depth);
+  EXPECT_NEAR(prediction.disparity, 20, 0.5);
+  EXPECT_GT(prediction.disparity_sd, 0);
+  EXPECT_EQ(prediction.colour[0], 120);
+}
+
+TEST_F(TrackerOf, UncertaintyOfThePredictionGrowsWithTime) {
+  for (int k = 0; k <= 25; ++k) step({seen_at(100 + 4 * k, 150, 20)});
+  double before = 0;
+  for (int k = 0; k < 5; ++k) {
+    const Prediction prediction = tracker->predict(kDt)[0];
+    EXPECT_GT(prediction.image_sd, before);
+    before = prediction.image_sd;
+    tracker->update({});
+  }
+}
+
+TEST_F(TrackerOf, MonoTargetsAreTrackedInThePicture) {
+  make(config(), 0);
+  for (int k = 0; k < 10; ++k) step({seen_at(100 + 5 * k, 150)});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_EQ(reports()[0].state, TrackState::kConfirmed);
+  EXPECT_FALSE(reports()[0].has_depth);
+  EXPECT_FALSE(tracker->predict(kDt)[0].has_depth);
+}
+
+TEST_F(TrackerOf, DepthThatComesLaterIsTaken) {
+  for (int k = 0; k < 5; ++k) step({seen_at(100 + 5 * k, 150)});
+  EXPECT_FALSE(reports()[0].has_depth);
+  for (int k = 5; k < 10; ++k) step({seen_at(100 + 5 * k, 150, 20)});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_TRUE(reports()[0].has_depth);
+  EXPECT_NEAR(reports()[0].position.z(), 5, 0.1);
+}
+
+std::vector<Detection> grid(int count, double dx) {
+  std::vector<Detection> out;
+  for (int i = 0; i < count; ++i) out.push_back(seen_at(40 + 70 * (i % 8) + dx, 30 + 55 * (i / 8)));
+  return out;
+}
+
+TEST_F(TrackerOf, OneMoreThanTheCapacityIsRefusedAndCounted) {
+  step(grid(Tracker::kMaxTracks, 0));
+  EXPECT_EQ(reports().size(), 64U);
+  EXPECT_EQ(tracker->refused(), 0U);
+  std::vector<Detection> next = grid(Tracker::kMaxTracks, 2);
+  next[10] = seen_at(620, 465);
+  step(next);
+  EXPECT_EQ(reports().size(), 64U);
+  EXPECT_EQ(tracker->refused(), 1U);
+  for (std::size_t i = 0; i < reports().size(); ++i) EXPECT_EQ(reports()[i].id, i + 1);
+}
+
+TEST_F(TrackerOf, MoreDetectionsThanTheCapacityAreNotLookedAt) {
+  std::vector<Detection> many = grid(Tracker::kMaxDetections, 0);
+  many.push_back(seen_at(620, 465));
+  step(many);
+  EXPECT_EQ(reports().size(), 64U);
+  EXPECT_EQ(tracker->refused(), 0U);
+}
+
+TEST_F(TrackerOf, IdsAreInOrderAndNeverUsedAgain) {
+  std::uint32_t highest = 0;
+  std::mt19937 random(6);
+  for (int k = 0; k < 300; ++k) {
+    std::vector<Detection> detections;
+    for (unsigned i = 0; i < random() % 6; ++i) {
+      detections.push_back(seen_at(20 + static_cast<double>(random() % 600), 20 + static_cast<double>(random() % 440)));
+    }
+    std::vector<std::uint32_t> before;
+    for (const TrackReport& report : reports()) before.push_back(report.id);
+    step(detections);
+    std::uint32_t previous = 0;
+    for (const TrackReport& report : reports()) {
+      ASSERT_GT(report.id, previous);
+      previous = report.id;
+      if (std::find(before.begin(), before.end(), report.id) == before.end()) {
+        ASSERT_GT(report.id, highest);
+      }
+    }
+    highest = std::max(highest, previous);
+  }
+  EXPECT_GT(highest, 200U);
+}
+
+TEST_F(TrackerOf, SameDetectionsGiveTheSameReports) {
+  const auto run = [&] {
+    make(config());
+    std::mt19937 random(7);
+    for (int k = 0; k < 50; ++k) {
+      step({seen_at(100 + 5 * k + static_cast<double>(random() % 3), 150, 20), seen_at(400 - 4 * k, 220, 30)});
+    }
+    return std::vector<TrackReport>(reports().begin(), reports().end());
+  };
+  const std::vector<TrackReport> first = run();
+  const std::vector<TrackReport> second = run();
+  ASSERT_EQ(first.size(), second.size());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(first[i].position, second[i].position);
+    EXPECT_EQ(first[i].covariance, second[i].covariance);
+    EXPECT_EQ(first[i].image_x, second[i].image_x);
+  }
+}
+
+TEST(Tracker, Faults) {
+  Arena arena;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto fault_of = [&](auto&& change, const Tracker::View& view = {640, 480, 500, 100}) {
+    Tracker::Config c = config();
+    change(c);
+    const auto created = Tracker::create(c, view, arena);
+    return created ? Fault{} : created.error();
+  };
+  const auto nothing = [](Tracker::Config&) {};
+  EXPECT_EQ(fault_of(nothing), Fault{});
+  EXPECT_EQ(fault_of([](auto& c) { c.confirm_hits = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.confirm_hits = 21; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.tentative_misses = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.coast_s = -1; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([&](auto& c) { c.gate = nan; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.acceleration = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.initial_speed = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.centre_noise_px = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.centre_noise_size = -1; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of(nothing, {0, 480, 500, 100}), Fault::kBadSize);
+  EXPECT_EQ(fault_of(nothing, {640, 480, 0, 100}), Fault::kBadSize);
+  EXPECT_EQ(fault_of(nothing, {640, 480, 500, nan}), Fault::kBadSize);
+  arena.seal();
+  EXPECT_EQ(fault_of(nothing), Fault::kOutOfMemory);
+}
+
+}  // namespace
+}  // namespace stereotrack
