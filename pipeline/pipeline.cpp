@@ -102,7 +102,7 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
     view.focal_baseline = view.focal * self.rectifier_->geometry().baseline;
   }
   const bool all = keep(self.detector_, Detector::create(config.objects, setup.width, setup.height, arena), outcome) &&
-                   keep(self.tracker_, Tracker::create(config.track, view, arena), outcome);
+                   keep(self.tracker_, Tracker::create(config.track, config.features, view, arena), outcome);
   if (!all) return fail(outcome.error());
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
@@ -214,7 +214,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
 
   ingest(pair);  // gray 3.1, equalisation 3.2-3.5, chroma 3.17-3.19
   ended(Stage::kIngest);
-  predictions_ = tracker_->predict(dt);  // 3.24, 3.26, 3.27: bounds the searches below
+  predictions_ = tracker_->predict(dt, left_.y);  // 3.24, 3.26, 3.27: bounds the searches below
   find_foreground();                     // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
   ended(Stage::kForeground);             // contours, opening 3.13-3.15, blobs
   refine_blobs();                        // convex hull 3.16, level set
@@ -234,7 +234,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   for (Detector::Candidate& candidate : detector_->segment(objects)) match_whole(candidate, objects);
   const std::span<const Detection> detections = detector_->conclude(objects);
   ended(Stage::kObjects);
-  tracker_->update(detections);  // 3.25, 3.28-3.32
+  tracker_->update(detections, left_.y, blobs_.labels);  // 3.25, 3.28-3.32
   ended(Stage::kTracking);
   learn_background();
   ended(Stage::kBackground);
@@ -537,7 +537,7 @@ void Pipeline::remove_shadows() noexcept {
   (void)opening_->run(left_.mask, scratch_);
   if (background_left_) (void)contour_fill_->run(scratch_, scratch_);
   if (const auto blobs = blob_extractor_->run(scratch_); blobs.has_value()) blobs_ = *blobs;
-  if (config_.shadow.method == ShadowMethod::kStereo) reject_background();
+  if (background_left_ && config_.shadow.method == ShadowMethod::kStereo) reject_background();
 }
 
 // Where single pixels tell little, because the object is small or blurred, all of its pixels are matched together.

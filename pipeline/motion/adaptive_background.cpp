@@ -14,7 +14,8 @@ constexpr int kPriorFrames = 8;
 // Grid of the gain estimate and its histogram: ratios 1/4 .. 4 around 256.
 constexpr int kGainStep = 3;
 constexpr int kGainBins = 1024;
-constexpr int kGainDarkest = 20;  // below, the ratio is mostly noise
+constexpr int kGainDarkest = 20 * 256;     // below, the ratio is mostly noise [8.8]
+constexpr int kGainBrightest = 250 * 256;  // above, the picture is clipped
 // How far a pixel may be from its candidate and still be the same look [8.8].
 constexpr int kCandidateReach = 12 * 256;
 
@@ -58,15 +59,17 @@ int AdaptiveBackground::estimate_gain(ImageView<const std::uint8_t> y) const noe
   std::uint32_t total = 0;
   for (int v = 0; v < y.height; v += kGainStep) {
     for (int u = 0; u < y.width; u += kGainStep) {
-      const int background = y_.mean.at(u, v) >> 8;
+      const int background = y_.mean.at(u, v);
       const int now = y.at(u, v);
-      if (background < kGainDarkest || now < 4 || now > 250 || background > 250 || foreground_.at(u, v) != 0) continue;
-      ++histogram[static_cast<std::size_t>(std::min((now * 256 + background / 2) / background, kGainBins - 1))];
+      if (background < kGainDarkest || background > kGainBrightest || now < 4 || now > 250 ||
+          foreground_.at(u, v) != 0) {
+        continue;
+      }
+      ++histogram[static_cast<std::size_t>(std::min((now * 65536 + background / 2) / background, kGainBins - 1))];
       ++total;
     }
   }
   if (total < 64) return 256;
-  // The median, refined inside its neighbourhood: the mean of the ratios near it is finer than a bin.
   std::uint32_t below = 0;
   int median = 0;
   while (below + histogram[static_cast<std::size_t>(median)] <= total / 2) {

@@ -50,17 +50,17 @@ bool ShadowTest::looks_like_background(const Input& in, int x, int y, int slack)
   const bool darker = ratio * 100 * slack >= config_.darkest_percent * 256 && ratio * 100 < kBrightestPercent * 256;
   const bool lit = slack > 1 && ratio < 2 * 256;  // stereo has spoken: it may be brighter, too
   if (!weak && !darker && !lit) return false;
+  const auto chroma_kept = [&](int value, int background) {
+    return std::abs((value - 128) * 256 - (background - 128) * ratio) <= config_.chroma_tolerance * 256 * slack;
+  };
+  const bool colour_kept = in.cb.empty() || (chroma_kept(in.cb.at(x, y), in.cb_background.at(x, y)) &&
+                                             chroma_kept(in.cr.at(x, y), in.cr_background.at(x, y)));
   int residual = 0;
   for_each_neighbour(x, y, verdicts_.width, verdicts_.height, [&](int u, int v) {
     residual += std::abs(in.y.at(u, v) * 256 - in.y_background.at(u, v) * ratio);
   });
   if (residual > (config_.texture_tolerance * 256 * slack) * count) return false;
-  if (weak || in.cb.empty()) return true;
-  const auto chroma_kept = [&](int value, int background) {
-    return std::abs((value - 128) * 256 - (background - 128) * ratio) <= config_.chroma_tolerance * 256 * slack;
-  };
-  return chroma_kept(in.cb.at(x, y), in.cb_background.at(x, y)) &&
-         chroma_kept(in.cr.at(x, y), in.cr_background.at(x, y));
+  return weak || colour_kept;
 }
 
 ShadowTest::Depth ShadowTest::depth_of(const Input& in, int x, int y) const noexcept {

@@ -320,9 +320,10 @@ bool Detector::belong_together(const Input& in, const Candidate& a, const Candid
       return false;
     }
   }
+  const int across = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
+  const bool stacked = across * 2 >= std::min(a.box.width, b.box.width);
   if (claim_a >= 0 && claim_b >= 0) {
-    const int across = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
-    if (across * 2 < std::min(a.box.width, b.box.width)) return false;
+    if (!stacked) return false;
     const Prediction& first = in.predictions[static_cast<std::size_t>(claim_a)];
     const Prediction& second = in.predictions[static_cast<std::size_t>(claim_b)];
     const double speed = std::max(length(first.vx, first.vy), length(second.vx, second.vy));

@@ -15,6 +15,7 @@ constexpr int kArea = Features::kPatch * Features::kPatch;
 // Where a patch was found to about this many pixels.
 constexpr double kSearchNoise = 0.4;
 
+using Vector = ConstantVelocityFilter<2>::Vector;
 using Patch = std::array<std::uint8_t, kArea>;
 
 bool patch_fits(ImageView<const std::uint8_t> luma, int x, int y) noexcept {
@@ -45,9 +46,41 @@ int zero_mean_difference(const Patch& patch, int patch_sum, ImageView<const std:
   return difference / kArea;
 }
 
-double parabola(int before, int best, int after) noexcept {
-  const int curvature = before - 2 * best + after;
-  return curvature > 0 ? 0.5 * (before - after) / curvature : 0.0;
+// From the whole pixel (x, y), where the patch fits best, to where it fits best between the pixels; at most one pixel.
+Vector sub_pixel(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y) noexcept {
+  if (x <= kReach || y <= kReach || x + kReach + 1 >= luma.width || y + kReach + 1 >= luma.height)
+    return Vector::Zero();
+  // Integers, so that nothing depends on the order: sums over the patch of gx, gy, e and their products.
+  std::int64_t gx = 0, gy = 0, e = 0, xx = 0, xy = 0, yy = 0, xe = 0, ye = 0;
+  for (int v = -kReach; v <= kReach; ++v) {
+    for (int u = -kReach; u <= kReach; ++u) {
+      const int across = luma.at(x + u + 1, y + v) - luma.at(x + u - 1, y + v);
+      const int down = luma.at(x + u, y + v + 1) - luma.at(x + u, y + v - 1);
+      const int apart =
+          patch[static_cast<std::size_t>((v + kReach) * Features::kPatch + u + kReach)] - luma.at(x + u, y + v);
+      gx += across;
+      gy += down;
+      e += apart;
+      xx += across * across;
+      xy += across * down;
+      yy += down * down;
+      xe += across * apart;
+      ye += down * apart;
+    }
+  }
+  const auto centred = [](std::int64_t product, std::int64_t a, std::int64_t b) {
+    return static_cast<double>(product * kArea - a * b);
+  };
+  const double a = centred(xx, gx, gx);
+  const double b = centred(xy, gx, gy);
+  const double c = centred(yy, gy, gy);
+  const double p = centred(xe, gx, e);
+  const double q = centred(ye, gy, e);
+  const double determinant = a * c - b * b;
+  if (!(determinant > 1e-3 * a * c)) return Vector::Zero();
+  // Gradients over two pixels are twice the slope.
+  const Vector step(2 * (c * p - b * q) / determinant, 2 * (a * q - b * p) / determinant);
+  return step.cwiseMax(-1).cwiseMin(1);
 }
 
 }  // namespace
@@ -89,11 +122,13 @@ void Features::follow(ImageView<const std::uint8_t> luma, double dt, double acce
       ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
   Set kept;
   for (Feature& feature : set) {
+    const ConstantVelocityFilter<2>::Vector before = feature.filter.position();
     feature.filter.predict(dt, acceleration_sd);
     const auto expected = feature.filter.position();
     const auto S = (feature.filter.position_covariance() + R).eval();
     const auto reach = [&](double variance) {
-      return std::clamp(static_cast<int>(std::ceil(3 * std::sqrt(variance))), 2, config_.search_px);
+      return std::clamp(static_cast<int>(std::ceil(3 * std::sqrt(variance))), std::min(2, config_.search_px),
+                        config_.search_px);
     };
     const int reach_x = reach(S(0, 0));
     const int reach_y = reach(S(1, 1));
@@ -116,19 +151,15 @@ void Features::follow(ImageView<const std::uint8_t> luma, double dt, double acce
       }
     }
     if (best > config_.most_difference * kArea) continue;
-    double sub_x = 0;
-    double sub_y = 0;
-    if (patch_fits(luma, best_x - 1, best_y) && patch_fits(luma, best_x + 1, best_y)) {
-      sub_x = parabola(zero_mean_difference(feature.patch, patch_sum, luma, best_x - 1, best_y), best,
-                       zero_mean_difference(feature.patch, patch_sum, luma, best_x + 1, best_y));
+    const Vector found = feature.offset + Vector(best_x, best_y) + sub_pixel(feature.patch, luma, best_x, best_y);
+    if (!feature.filter.update(found, R)) continue;
+    const int x = static_cast<int>(std::floor(found.x() + 0.5));
+    const int y = static_cast<int>(std::floor(found.y() + 0.5));
+    if (best > config_.most_difference * kArea / 2 && patch_fits(luma, x, y)) {
+      cut(luma, x, y, feature.patch);
+      feature.offset = found - Vector(x, y);
     }
-    if (patch_fits(luma, best_x, best_y - 1) && patch_fits(luma, best_x, best_y + 1)) {
-      sub_y = parabola(zero_mean_difference(feature.patch, patch_sum, luma, best_x, best_y - 1), best,
-                       zero_mean_difference(feature.patch, patch_sum, luma, best_x, best_y + 1));
-    }
-    if (!feature.filter.update({best_x + sub_x, best_y + sub_y}, R)) continue;
-    cut(luma, best_x, best_y, feature.patch);
-    feature.seen = true;
+    feature.moved = feature.filter.position() - before;
     (void)kept.push(feature);
   }
   set = kept;

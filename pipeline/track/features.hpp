@@ -20,7 +20,11 @@ namespace stereotrack {
 /// Corners: smaller eigenvalue of the structure tensor over a 5x5 window (Shi and Tomasi 1994)
 ///     l = (a + c - sqrt((a - c)^2 + 4 b^2)) / 2,   [a b; b c] = sum [gx^2 gx gy; gx gy gy^2]
 /// Search: sum of absolute differences of the 9x9 patch, each less its mean (so that a change of the light does
-/// not matter), over all integer positions of the window; then a parabola each way for the sub-pixel.
+/// not matter), over all integer positions of the window; then one step of Gauss and Newton for the sub-pixel
+/// (Lucas and Kanade 1981),
+///     [sum gx^2  sum gx gy; sum gx gy  sum gy^2] step = sum [gx; gy] (patch - picture),
+/// g the picture's gradient, all less their means. A patch is cut anew only when it has come to differ by half of
+/// most_difference: each cut adds the sub-pixel's error to the path.
 class Features {
  public:
   static constexpr int kPatch = 9;  ///< side of a patch [px]
@@ -35,7 +39,10 @@ class Features {
   struct Feature {
     ConstantVelocityFilter<2> filter;  ///< raw left picture [px, px/s]
     std::array<std::uint8_t, kPatch * kPatch> patch{};
-    bool seen = false;  ///< found in the latest frame
+    /// From the patch's centre, a whole pixel, to the feature; at most half a pixel each way.
+    ConstantVelocityFilter<2>::Vector offset = ConstantVelocityFilter<2>::Vector::Zero();
+    ConstantVelocityFilter<2>::Vector moved =
+        ConstantVelocityFilter<2>::Vector::Zero();  ///< from the frame before to the latest [px]
   };
   using Set = FixedVector<Feature, kMost>;
 

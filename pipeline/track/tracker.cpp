@@ -11,11 +11,20 @@ using Matrix2 = ConstantVelocityFilter<2>::Matrix;
 using Vector2 = ConstantVelocityFilter<2>::Vector;
 
 // Size and colour tell targets apart, but may not outweigh where they are: each adds at most this.
-constexpr double kMostSoftCost = 9.0;
+constexpr double kMostSoftCost = 16.0;
 // One standard deviation of the size between two frames, as a ratio of areas, and of the mean colour.
 constexpr double kAreaRatioSd = 1.5;
 constexpr double kLumaSd = 14.0;
 constexpr double kChromaSd = 6.0;
+// Features that a target needs for their votes to count, and what their vote weighs.
+constexpr std::size_t kVoters = 3;
+constexpr double kFeatureCost = 6.0;
+// How much a new feature's speed may differ from its target's, as a fraction of the distance [1/s].
+constexpr double kFeatureSpeed = 0.1;
+// What is left beyond the gate for looks: above, a target rather stays alone.
+constexpr double kStranger = 9.0;
+// A target of which less than this part would still be in the picture has left.
+constexpr double kVisiblePart = 0.5;
 // Smoothing of size and colour: a partly hidden target must not be learnt at once.
 constexpr double kAppearanceRate = 0.2;
 // A target that comes straight on hardly moves in the picture: this change of distance shows it.
@@ -32,7 +41,8 @@ Matrix2 centre_noise(const Tracker::Config& config, const Rect& box) noexcept {
 
 }  // namespace
 
-Result<Tracker> Tracker::create(const Config& config, const View& view, Arena& arena) noexcept {
+Result<Tracker> Tracker::create(const Config& config, const Features::Config& features, const View& view,
+                                Arena& arena) noexcept {
   if (config.confirm_hits < 1 || config.confirm_hits > 20 || config.tentative_misses < 1 || !(config.coast_s >= 0) ||
       !(config.gate > 0) || !(config.acceleration > 0) || !(config.initial_speed > 0) ||
       !(config.centre_noise_px > 0) || !(config.centre_noise_size >= 0)) {
@@ -41,7 +51,9 @@ Result<Tracker> Tracker::create(const Config& config, const View& view, Arena& a
   if (view.width < 1 || view.height < 1 || !(view.focal > 0) || !(view.focal_baseline >= 0)) {
     return fail(Fault::kBadSize);
   }
-  Tracker self;
+  const Result<Features> made = Features::create(features, view.width, view.height, arena);
+  if (!made) return fail(made.error());
+  Tracker self(*made);
   self.config_ = config;
   self.view_ = view;
   Result<Assignment> assignment = Assignment::create(kMaxTracks, kMaxDetections, arena);
@@ -60,13 +72,14 @@ Result<Tracker> Tracker::create(const Config& config, const View& view, Arena& a
   return self;
 }
 
-std::span<const Prediction> Tracker::predict(double dt) noexcept {
+std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uint8_t> luma) noexcept {
   dt_ = dt;
   predictions_.clear();
   for (Target& target : targets_) {
     target.image.predict(dt, config_.acceleration * view_.focal);
     const double distance = std::max(target.space.position().z(), 0.0);
     if (target.has_depth) target.space.predict(dt, config_.acceleration * distance);
+    if (!luma.empty()) features_.follow(luma, dt, config_.acceleration * view_.focal, target.features);
     Prediction prediction;
     prediction.id = target.id;
     prediction.confirmed = target.state != TrackState::kTentative;
@@ -120,7 +133,19 @@ double Tracker::cost(const Target& target, const Detection& detection) const noe
   const double in_size = std::min(square((ratio - 1) / kAreaRatioSd), kMostSoftCost);
   double in_colour = square((detection.colour[0] - target.colour[0]) / kLumaSd);
   for (std::size_t i = 1; i < 3; ++i) in_colour += square((detection.colour[i] - target.colour[i]) / kChromaSd);
-  return in_picture + in_depth + in_size + std::min(in_colour, kMostSoftCost);
+  double in_features = 0;
+  if (target.features.size() >= kVoters) {
+    int inside = 0;
+    for (const Features::Feature& feature : target.features) {
+      const auto at = feature.filter.position();
+      inside += at.x() >= detection.box.left && at.x() < detection.box.right() && at.y() >= detection.box.top &&
+                        at.y() < detection.box.bottom()
+                    ? 1
+                    : 0;
+    }
+    in_features = kFeatureCost * (1 - inside / static_cast<double>(target.features.size()));
+  }
+  return in_picture + in_depth + in_size + in_features + std::min(in_colour, kMostSoftCost);
 }
 
 void Tracker::associate(std::span<const Detection> detections, bool confirmed) noexcept {
@@ -141,20 +166,22 @@ void Tracker::associate(std::span<const Detection> detections, bool confirmed) n
       costs_[static_cast<std::size_t>(row * columns + column)] = cost(target, detections[static_cast<std::size_t>(j)]);
     }
   }
-  const double alone = 2 * square(config_.gate) + 2 * kMostSoftCost;
+  // A pair may be as far apart as the gate, or look somewhat different, but not both.
+  const double alone = square(config_.gate) + kStranger;
   assignment_.solve(costs_, rows, columns, alone, detection_of_row_);
   for (int row = 0; row < rows; ++row) {
     const int column = detection_of_row_[static_cast<std::size_t>(row)];
     if (column == Assignment::kNone) continue;
     const auto i = static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)]);
     const auto j = static_cast<std::size_t>(detection_of_column_[static_cast<std::size_t>(column)]);
-    measure(targets_[i], detections[j]);
+    measure(targets_[i], detections[j], static_cast<std::uint16_t>(j + 1));
     target_used_[i] = 1;
     detection_used_[j] = 1;
   }
 }
 
-void Tracker::measure(Target& target, const Detection& detection) noexcept {
+void Tracker::measure(Target& target, const Detection& detection, std::uint16_t label) noexcept {
+  target.label = label;
   const Vector2 z(detection.centre_x(), detection.centre_y());
   (void)target.image.update(z, centre_noise(config_, detection.box));
   if (detection.has_depth) {
@@ -191,7 +218,24 @@ void Tracker::measure(Target& target, const Detection& detection) noexcept {
   }
 }
 
+void Tracker::renew_features(Target& target, ImageView<const std::uint8_t> luma,
+                             ImageView<const std::uint16_t> labels) noexcept {
+  if (target.label == 0 || luma.empty() || labels.empty()) return;
+  // Features that are no longer on the object belong to something else.
+  Features::Set kept;
+  for (const Features::Feature& feature : target.features) {
+    const int x = static_cast<int>(std::floor(feature.filter.position().x() + 0.5));
+    const int y = static_cast<int>(std::floor(feature.filter.position().y() + 0.5));
+    if (labels.contains(x, y) && labels.at(x, y) == target.label) (void)kept.push(feature);
+  }
+  target.features = kept;
+  if (target.features.size() * 2 > Features::kMost) return;
+  features_.refill(luma, labels, target.label, target.box, target.image.velocity(), kFeatureSpeed * view_.focal,
+                   target.features);
+}
+
 void Tracker::miss(Target& target) noexcept {
+  target.label = 0;
   target.whole = false;
   target.measured = false;
   ++target.misses_in_a_row;
@@ -206,8 +250,9 @@ void Tracker::miss(Target& target) noexcept {
   target.hull.clear();
 }
 
-void Tracker::start(const Detection& detection) noexcept {
+void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   Target target{};
+  target.label = label;
   target.id = next_id_;
   target.state = TrackState::kTentative;
   target.width = detection.box.width;
@@ -250,10 +295,12 @@ bool Tracker::got_somewhere(const Target& target) const noexcept {
 bool Tracker::expired(const Target& target) const noexcept {
   if (target.measured) return false;
   if (target.state == TrackState::kTentative) return target.misses_in_a_row >= config_.tentative_misses;
-  return target.unseen_s > config_.coast_s || target.box.empty();
+  return target.unseen_s > config_.coast_s ||
+         static_cast<double>(target.box.area()) < kVisiblePart * target.width * target.height;
 }
 
-void Tracker::update(std::span<const Detection> detections) noexcept {
+void Tracker::update(std::span<const Detection> detections, ImageView<const std::uint8_t> luma,
+                     ImageView<const std::uint16_t> labels) noexcept {
   detections = detections.first(std::min<std::size_t>(detections.size(), kMaxDetections));
   std::fill(detection_used_.begin(), detection_used_.end(), static_cast<unsigned char>(0));
   std::fill(target_used_.begin(), target_used_.end(), static_cast<unsigned char>(0));
@@ -277,8 +324,9 @@ void Tracker::update(std::span<const Detection> detections) noexcept {
   }
   targets_.truncate(kept);
   for (std::size_t j = 0; j < detections.size(); ++j) {
-    if (detection_used_[j] == 0) start(detections[j]);
+    if (detection_used_[j] == 0) start(detections[j], static_cast<std::uint16_t>(j + 1));
   }
+  for (Target& target : targets_) renew_features(target, luma, labels);
   std::uint64_t whole = 0;
   for (const Target& target : targets_) whole |= target.whole ? Prediction::bit(target.id) : 0;
   for (Target& target : targets_) target.apart |= target.whole ? whole : 0;

@@ -9,6 +9,7 @@
 #include "pipeline/core/result.hpp"
 #include "pipeline/track/assignment.hpp"
 #include "pipeline/track/detection.hpp"
+#include "pipeline/track/features.hpp"
 #include "pipeline/track/kalman.hpp"
 #include "pipeline/track/track_report.hpp"
 
@@ -23,6 +24,9 @@ namespace stereotrack {
 /// Association: squared Mahalanobis distance in the picture, in disparity, and of size and colour, added and
 /// solved as one assignment problem; confirmed targets first, tentative ones among what is left. The gate has
 /// room for one missing frame: the distance covered in one step counts as uncertainty along the motion.
+///
+/// Features: each target carries corners of its surface, searched in the window that their own filters predict
+/// (features.hpp). Those found vote for the detection in whose box they lie.
 ///
 /// Life: a detection without a target starts a tentative one. It is confirmed by confirm_hits detections if it
 /// has got somewhere meanwhile: at least travel_px in the picture and straight_part of the path it took (flicker
@@ -40,7 +44,7 @@ class Tracker {
     int tentative_misses = 2;          ///< frames without detection that remove a tentative target, 1..10
     double coast_s = 1.5;              ///< how long a confirmed target lives without detections [s], 0..60
     double gate = 4.0;                 ///< association gate [standard deviations], 1..10
-    double acceleration = 1.5;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
+    double acceleration = 0.8;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
     double initial_speed = 2.0;        ///< uncertainty of a new target's speed as a fraction of its distance [1/s]
     double centre_noise_px = 0.7;      ///< noise of a box centre [px], 0.05..20
     double centre_noise_size = 0.05;   ///< and what it grows by with the box's size [1], 0..1
@@ -57,13 +61,17 @@ class Tracker {
   };
 
   /// Faults: kBadConfig, kBadSize, kOutOfMemory.
-  [[nodiscard]] static Result<Tracker> create(const Config& config, const View& view, Arena& arena) noexcept;
+  [[nodiscard]] static Result<Tracker> create(const Config& config, const Features::Config& features, const View& view,
+                                              Arena& arena) noexcept;
 
-  /// Moves all targets on by dt seconds (>= 0) and says where they are expected.
-  [[nodiscard]] std::span<const Prediction> predict(double dt) noexcept;
+  /// Moves all targets on by dt seconds (>= 0), searches their features in `luma` (raw left picture; empty: not)
+  /// and says where they are expected.
+  [[nodiscard]] std::span<const Prediction> predict(double dt, ImageView<const std::uint8_t> luma = {}) noexcept;
 
-  /// Takes the detections of this frame in. More than kMaxDetections: the rest is not looked at.
-  void update(std::span<const Detection> detections) noexcept;
+  /// Takes the detections of this frame in. More than kMaxDetections: the rest is not looked at. New features
+  /// are taken from `luma` where labels == i + 1 for detection i; empty: none.
+  void update(std::span<const Detection> detections, ImageView<const std::uint8_t> luma = {},
+              ImageView<const std::uint16_t> labels = {}) noexcept;
 
   /// All targets, confirmed, coasting and tentative, in the order of their ids.
   [[nodiscard]] std::span<const TrackReport> reports() const noexcept { return reports_.view(); }
@@ -101,16 +109,22 @@ class Tracker {
     ConstantVelocityFilter<3> space;
     Rect box;
     FixedVector<Point, 48> hull;
+    std::uint16_t label;  // its detection's, 0 = none in this frame
+    Features::Set features;
   };
 
   [[nodiscard]] double cost(const Target& target, const Detection& detection) const noexcept;
   void associate(std::span<const Detection> detections, bool confirmed) noexcept;
-  void measure(Target& target, const Detection& detection) noexcept;
+  void measure(Target& target, const Detection& detection, std::uint16_t label) noexcept;
+  void renew_features(Target& target, ImageView<const std::uint8_t> luma,
+                      ImageView<const std::uint16_t> labels) noexcept;
   void miss(Target& target) noexcept;
-  void start(const Detection& detection) noexcept;
+  void start(const Detection& detection, std::uint16_t label) noexcept;
   [[nodiscard]] bool got_somewhere(const Target& target) const noexcept;
   [[nodiscard]] bool expired(const Target& target) const noexcept;
   void report() noexcept;
+
+  explicit Tracker(const Features& features) noexcept : features_(features) {}
 
   Config config_;
   View view_;
@@ -127,6 +141,7 @@ class Tracker {
   std::span<unsigned char> detection_used_;
   std::span<unsigned char> target_used_;
   Assignment assignment_;
+  Features features_;
 };
 
 }  // namespace stereotrack

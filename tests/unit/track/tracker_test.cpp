@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <random>
 #include <vector>
@@ -35,6 +36,14 @@ Tracker::Config config() {
   return c;
 }
 
+Features::Config features() {
+  Features::Config c;
+  c.corner_quality = 100;
+  c.most_difference = 14;
+  c.search_px = 12;
+  return c;
+}
+
 /// A box of 24 x 24 around (x, y); disparity 0: not seen by stereo.
 Detection seen_at(double x, double y, double disparity = 0) {
   Detection out;
@@ -59,7 +68,7 @@ class TrackerOf : public testing::Test {
  protected:
   void SetUp() override { make(config()); }
   void make(const Tracker::Config& c, double focal_baseline = kFocalBaseline) {
-    auto created = Tracker::create(c, {kWidth, kHeight, kFocal, focal_baseline}, arena_);
+    auto created = Tracker::create(c, features(), {kWidth, kHeight, kFocal, focal_baseline}, arena_);
     ASSERT_TRUE(created.has_value());
     tracker.emplace(*created);
   }
@@ -352,10 +361,10 @@ std::vector<Detection> grid(int count, double dx) {
 }
 
 TEST_F(TrackerOf, OneMoreThanTheCapacityIsRefusedAndCounted) {
-  step(grid(Tracker::kMaxTracks, 0));
+  for (int k = 0; k < 10; ++k) step(grid(Tracker::kMaxTracks, 2 * k));
   EXPECT_EQ(reports().size(), 64U);
   EXPECT_EQ(tracker->refused(), 0U);
-  std::vector<Detection> next = grid(Tracker::kMaxTracks, 2);
+  std::vector<Detection> next = grid(Tracker::kMaxTracks, 20);
   next[10] = seen_at(620, 465);
   step(next);
   EXPECT_EQ(reports().size(), 64U);
@@ -414,13 +423,58 @@ TEST_F(TrackerOf, SameDetectionsGiveTheSameReports) {
   }
 }
 
+/// Pictures of a textured object of 24 x 24 on an even ground, and its label.
+struct Texture {
+  cv::Mat_<std::uint8_t> luma;
+  cv::Mat_<std::uint16_t> labels;
+
+  explicit Texture(const Rect& box)
+      : luma(kHeight, kWidth, std::uint8_t{90}), labels(kHeight, kWidth, std::uint16_t{0}) {
+    cv::Mat_<std::uint8_t> patch(24, 24);
+    cv::RNG(3).fill(patch, cv::RNG::UNIFORM, 0, 256);
+    cv::GaussianBlur(patch, patch, {3, 3}, 0);
+    const cv::Rect where(box.left, box.top, 24, 24);
+    patch.copyTo(luma(where));
+    labels(where).setTo(1);
+  }
+  [[nodiscard]] ImageView<const std::uint8_t> picture() const {
+    return {luma[0], kWidth, kHeight, static_cast<std::ptrdiff_t>(luma.step1())};
+  }
+  [[nodiscard]] ImageView<const std::uint16_t> regions() const {
+    return {labels[0], kWidth, kHeight, static_cast<std::ptrdiff_t>(labels.step1())};
+  }
+};
+
+TEST_F(TrackerOf, FeaturesVoteForTheDetectionInWhoseBoxTheyLie) {
+  // Two detections equally far from the prediction; the texture has gone a little to one side.
+  for (const double side : {-1.0, 1.0}) {
+    make(config());
+    double x = 100;
+    for (int k = 0; k < 15; ++k, x += 6) {
+      const Detection object = seen_at(x, 200);
+      const Texture texture(object.box);
+      (void)tracker->predict(kDt, texture.picture());
+      tracker->update({&object, 1}, texture.picture(), texture.regions());
+    }
+    const Texture moved(seen_at(x + 3 * side, 200).box);
+    const Prediction prediction = tracker->predict(kDt, moved.picture())[0];
+    const double centre = prediction.box.left + 12;
+    const std::vector<Detection> both{seen_at(centre - 12, 200), seen_at(centre + 12, 200)};
+    tracker->update(both);
+    ASSERT_EQ(reports().size(), 2U);
+    EXPECT_EQ(reports()[0].id, 1U);
+    EXPECT_TRUE(reports()[0].measured);
+    EXPECT_EQ(reports()[0].box, both[side < 0 ? 0 : 1].box) << side;
+  }
+}
+
 TEST(Tracker, Faults) {
   Arena arena;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto fault_of = [&](auto&& change, const Tracker::View& view = {640, 480, 500, 100}) {
     Tracker::Config c = config();
     change(c);
-    const auto created = Tracker::create(c, view, arena);
+    const auto created = Tracker::create(c, features(), view, arena);
     return created ? Fault{} : created.error();
   };
   const auto nothing = [](Tracker::Config&) {};
