@@ -34,6 +34,7 @@ struct Prediction {
   std::uint64_t apart = 0;   ///< bit id % 64 of each target that was seen beside this one, each a region of its own
   bool independent = false;  ///< has been seen as a region of its own, not only cut out of another's
   Rect box;                 ///< expected box, raw left picture, may reach outside [px]
+  double area = 0;          ///< expected pixels of its mask
   double vx = 0;            ///< velocity of its centre in the picture [px/s]
   double vy = 0;
   double image_sd = 0;      ///< standard deviation of its centre, the larger axis [px]

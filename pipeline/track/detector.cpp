@@ -18,6 +18,9 @@ constexpr std::size_t kBins = 0x10000 / kBin;
 constexpr double kClaimPart = 0.25;
 // Targets of which the smaller lies inside the larger by this much are taken for one object.
 constexpr double kNestedPart = 0.6;
+constexpr double kOwnGap = 2;
+// Part of its usual area that a target must get of a shared region.
+constexpr double kSplinterPart = 0.2;
 // A depth that does not fit counts against a pixel at most this much.
 constexpr double kMostDepthCost = 16.0;
 // A region's disparity is never known better than this, whatever the number of pixels: errors of neighbours go
@@ -156,6 +159,30 @@ void Detector::layers_from_depth(const Input& in, const Blob& blob) noexcept {
   close();
 }
 
+// A target that would get but a splinter of the region is not there: it is hidden, or gone.
+void Detector::drop_weak_claims(const Input& in, const Blob& blob) noexcept {
+  while (layers_.size() >= 2) {
+    std::array<int, 8> pixels{};
+    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) { ++pixels[choose(in, x, y)]; });
+    std::size_t weakest = layers_.size();
+    double least = kSplinterPart;
+    for (std::size_t k = 0; k < layers_.size(); ++k) {
+      const double expected = in.predictions[static_cast<std::size_t>(layers_[k].claim)].area;
+      const double part = pixels[k] / std::max(expected, 1.0);
+      if (part < least) {
+        least = part;
+        weakest = k;
+      }
+    }
+    if (weakest == layers_.size()) return;
+    FixedVector<Layer, 8> kept;
+    for (std::size_t k = 0; k < layers_.size(); ++k) {
+      if (k != weakest) (void)kept.push(layers_[k]);
+    }
+    layers_ = kept;
+  }
+}
+
 std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
   const int raw = in.disparity.empty() ? kNoDisparity : in.disparity.at(x, y);
   std::size_t best = 0;
@@ -189,6 +216,7 @@ void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, bo
 void Detector::split(const Input& in, const Blob& blob) noexcept {
   layers_.clear();
   layers_from_claims(in, blob);
+  if (layers_.size() >= 2) drop_weak_claims(in, blob);
   const bool claimed = layers_.size() >= 2;
   if (!claimed) {
     layers_.clear();
@@ -312,7 +340,6 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
 bool Detector::belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept {
   const int claim_a = claim_of(in, a);
   const int claim_b = claim_of(in, b);
-  if (claim_a >= 0 && claim_a == claim_b) return true;
   if (a.has_depth && b.has_depth) {
     const double nearer = std::max(a.disparity, b.disparity);
     const double apart = std::abs(a.disparity - b.disparity);
@@ -322,7 +349,8 @@ bool Detector::belong_together(const Input& in, const Candidate& a, const Candid
   }
   const int across = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
   const bool stacked = across * 2 >= std::min(a.box.width, b.box.width);
-  if (claim_a >= 0 && claim_b >= 0) {
+  const bool same = claim_a >= 0 && claim_a == claim_b;
+  if (!same && claim_a >= 0 && claim_b >= 0) {
     if (!stacked) return false;
     const Prediction& first = in.predictions[static_cast<std::size_t>(claim_a)];
     const Prediction& second = in.predictions[static_cast<std::size_t>(claim_b)];
@@ -331,7 +359,9 @@ bool Detector::belong_together(const Input& in, const Candidate& a, const Candid
     if (length(first.vx - second.vx, first.vy - second.vy) > 0.4 * speed + 0.2 * size) return false;
   }
   const Rect& larger = a.area >= b.area ? a.box : b.box;
-  return gap(a.box, b.box) <= config_.merge_gap * std::max(larger.width, larger.height);
+  // A target that is known to be one object may have come apart further than strangers may be.
+  const double reach = (same ? kOwnGap : 1) * config_.merge_gap * std::max(larger.width, larger.height);
+  return gap(a.box, b.box) <= reach;
 }
 
 void Detector::merge(const Input& in) noexcept {

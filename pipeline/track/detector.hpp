@@ -117,6 +117,7 @@ class Detector {
   explicit Detector(const ConvexHull& hull) noexcept : hull_(hull) {}
   void split(const Input& in, const Blob& blob) noexcept;
   void layers_from_claims(const Input& in, const Blob& blob) noexcept;
+  void drop_weak_claims(const Input& in, const Blob& blob) noexcept;
   void layers_from_depth(const Input& in, const Blob& blob) noexcept;
   [[nodiscard]] std::size_t choose(const Input& in, int x, int y) const noexcept;
   void add_candidate(std::uint16_t label, const Rect& box, int claim, bool whole) noexcept;

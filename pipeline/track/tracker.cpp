@@ -25,6 +25,14 @@ constexpr double kFeatureSpeed = 0.1;
 constexpr double kStranger = 9.0;
 // A target of which less than this part would still be in the picture has left.
 constexpr double kVisiblePart = 0.5;
+// Twins: frames, difference of distance and of speed as fractions, and sway of pieces [sizes/s].
+constexpr int kTwinFrames = 10;
+constexpr double kTwinDepth = 0.04;
+constexpr double kTwinSpeed = 0.15;
+constexpr double kTwinSway = 0.2;
+// A target may claim part of a region if it was seen on its own so often, and lately [s].
+constexpr int kIndependentHits = 8;
+constexpr double kClaimsFor = 0.7;
 // Smoothing of size and colour: a partly hidden target must not be learnt at once.
 constexpr double kAppearanceRate = 0.2;
 // A target that comes straight on hardly moves in the picture: this change of distance shows it.
@@ -83,10 +91,11 @@ std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uin
     Prediction prediction;
     prediction.id = target.id;
     prediction.confirmed = target.state != TrackState::kTentative;
+    prediction.area = target.area;
     prediction.vx = target.image.velocity().x();
     prediction.vy = target.image.velocity().y();
     prediction.apart = target.apart;
-    prediction.independent = target.whole_hits >= config_.confirm_hits;
+    prediction.independent = target.whole_hits >= kIndependentHits && target.unseen_s <= kClaimsFor;
     const Vector2 centre = target.image.position();
     prediction.box = {static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
                       static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
@@ -286,6 +295,33 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   }
 }
 
+bool Tracker::are_twins(const Target& a, const Target& b) const noexcept {
+  const Rect grown{a.box.left - 2, a.box.top - 2, a.box.width + 4, a.box.height + 4};
+  if (intersect(grown, b.box).empty()) return false;
+  if (a.has_depth && b.has_depth) {
+    const double za = a.space.position().z();
+    const double zb = b.space.position().z();
+    if (std::abs(za - zb) > kTwinDepth * std::min(za, zb)) return false;
+  }
+  const double speed = std::sqrt(std::max(a.image.velocity().squaredNorm(), b.image.velocity().squaredNorm()));
+  const double size = std::max({a.width, a.height, b.width, b.height});
+  const double apart = std::sqrt((a.image.velocity() - b.image.velocity()).squaredNorm());
+  return apart <= kTwinSpeed * speed + kTwinSway * size;
+}
+
+void Tracker::drop_twins() noexcept {
+  for (Target& target : targets_) {
+    bool twin = false;
+    for (std::size_t j = 0; j < targets_.size() && target.measured && !target.whole; ++j) {
+      const Target& other = targets_[j];
+      const bool greater = other.area > target.area || (other.area == target.area && other.id < target.id);
+      twin = twin || (greater && other.measured && !other.whole && are_twins(other, target));
+    }
+    if (target.measured) target.twin_frames = std::max(target.twin_frames + (twin ? 1 : -1), 0);
+  }
+  keep_targets([](const Target& target) { return target.twin_frames < kTwinFrames; });
+}
+
 bool Tracker::got_somewhere(const Target& target) const noexcept {
   if (target.way_px >= config_.travel_px && target.way_px >= config_.straight_part * target.path_px) return true;
   if (!target.has_depth || target.first_distance <= 0) return false;
@@ -316,16 +352,11 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
   for (std::size_t i = 0; i < known; ++i) {
     if (target_used_[i] == 0) miss(targets_[i]);
   }
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < targets_.size(); ++i) {
-    if (expired(targets_[i])) continue;
-    if (kept != i) targets_[kept] = targets_[i];
-    ++kept;
-  }
-  targets_.truncate(kept);
+  keep_targets([this](const Target& target) { return !expired(target); });
   for (std::size_t j = 0; j < detections.size(); ++j) {
     if (detection_used_[j] == 0) start(detections[j], static_cast<std::uint16_t>(j + 1));
   }
+  drop_twins();
   for (Target& target : targets_) renew_features(target, luma, labels);
   std::uint64_t whole = 0;
   for (const Target& target : targets_) whole |= target.whole ? Prediction::bit(target.id) : 0;

@@ -33,6 +33,9 @@ namespace stereotrack {
 /// jumps to and fro), or a twentieth of its distance. tentative_misses frames in a row without detection remove it. A confirmed target
 /// without detection coasts on its prediction for coast_s, or until it left the picture.
 ///
+/// Twins: an object that came into view in pieces has a target for each. Two that share one region for kTwinFrames, at
+/// one depth and of one motion, are one object: the smaller goes.
+///
 /// One thread. O(tracks x detections), no allocation after create().
 class Tracker {
  public:
@@ -88,6 +91,7 @@ class Tracker {
     int hits;
     std::uint64_t apart;  // see Prediction
     bool whole;           // measured in this frame, as a region of its own
+    int twin_frames;      // for how long it has shared one region with a larger target of its own depth and motion
     int whole_hits;  // detections that were regions of their own
     int misses_in_a_row;
     int frames;
@@ -120,6 +124,18 @@ class Tracker {
                       ImageView<const std::uint16_t> labels) noexcept;
   void miss(Target& target) noexcept;
   void start(const Detection& detection, std::uint16_t label) noexcept;
+  [[nodiscard]] bool are_twins(const Target& a, const Target& b) const noexcept;
+  void drop_twins() noexcept;
+  template <class Fn>
+  void keep_targets(Fn&& wanted) noexcept {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < targets_.size(); ++i) {
+      if (!wanted(targets_[i])) continue;
+      if (kept != i) targets_[kept] = targets_[i];
+      ++kept;
+    }
+    targets_.truncate(kept);
+  }
   [[nodiscard]] bool got_somewhere(const Target& target) const noexcept;
   [[nodiscard]] bool expired(const Target& target) const noexcept;
   void report() noexcept;
