@@ -99,6 +99,8 @@ std::vector<Key> keys_of(Configuration& c) {
           "Most iterations of the level set: bounds its cost."),
       key("level_set.margin_px", p.shape.level_set_config.margin_px, 0, 1000, "px",
           "How far the level set may leave a region's box."),
+      key("level_set.feature_cap", p.shape.level_set_config.feature_cap, 1, 255, "grey levels",
+          "Differences above this count alike: lower keeps dim parts of an object that has bright ones."),
       key("level_set.contour_weight", p.shape.level_set_config.contour_weight, 0, 65025, "grey^2/px",
           "Weight of the contour's length: higher gives smoother outlines."),
 

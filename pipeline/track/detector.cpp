@@ -360,8 +360,12 @@ bool Detector::belong_together(const Input& in, const Candidate& a, const Candid
   }
   const Rect& larger = a.area >= b.area ? a.box : b.box;
   // A target that is known to be one object may have come apart further than strangers may be.
-  const double reach = (same ? kOwnGap : 1) * config_.merge_gap * std::max(larger.width, larger.height);
-  return gap(a.box, b.box) <= reach;
+  double reach = std::max(larger.width, larger.height);
+  if (same) {
+    const Rect& whole = in.predictions[static_cast<std::size_t>(claim_a)].box;
+    reach = kOwnGap * std::max({larger.width, larger.height, whole.width, whole.height});
+  }
+  return gap(a.box, b.box) <= config_.merge_gap * reach;
 }
 
 void Detector::merge(const Input& in) noexcept {

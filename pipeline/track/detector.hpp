@@ -38,8 +38,8 @@ using RejectionCounts = std::array<std::uint32_t, kRejections>;
 /// goes to the target that explains it best,
 ///     cost = ((x - x_t) / w_t)^2 + ((y - y_t) / h_t)^2 + ((d - d_t) / s_t)^2,
 /// else a blob whose disparities form layers with a gap of split_depth between them is split into the layers.
-/// Merge: pieces that one confirmed target explains, or that are close in the picture (merge_gap) and in depth
-/// (merge_depth) and not claimed by different confirmed targets, are one object. So are two confirmed targets
+/// Merge: pieces that are close in the picture (merge_gap; twice that, of the whole target's size, for pieces that one
+/// confirmed target explains) and in depth (merge_depth), and not claimed by different targets, are one object. So are two confirmed targets
 /// one above the other, at one depth and of one motion: an object that had come apart.
 /// Depth of a piece: median of its disparities; its scatter is the median absolute deviation; its position the
 /// mean of its pixels' points (pixels without disparity take the median).

@@ -47,7 +47,7 @@ class Tracker {
     int tentative_misses = 2;          ///< frames without detection that remove a tentative target, 1..10
     double coast_s = 1.5;              ///< how long a confirmed target lives without detections [s], 0..60
     double gate = 4.0;                 ///< association gate [standard deviations], 1..10
-    double acceleration = 0.8;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
+    double acceleration = 1.2;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
     double initial_speed = 2.0;        ///< uncertainty of a new target's speed as a fraction of its distance [1/s]
     double centre_noise_px = 0.7;      ///< noise of a box centre [px], 0.05..20
     double centre_noise_size = 0.05;   ///< and what it grows by with the box's size [1], 0..1

@@ -242,11 +242,11 @@ TEST_F(DetectorOf, FarPiecesAndPiecesOfOtherDepthAreNotMerged) {
     paint(2, other, other_disparity);
     return run().size();
   };
-  // The longer side is 20: merge_gap allows 6 px beside each other, 12 px one above the other.
+  // The longer side is 20: merge_gap allows 6 px.
   EXPECT_EQ(objects({66, 30, 12, 20}, 20), 1U);
   EXPECT_EQ(objects({67, 30, 12, 20}, 20), 2U);
-  EXPECT_EQ(objects({40, 62, 20, 10}, 20), 1U);
-  EXPECT_EQ(objects({40, 63, 20, 10}, 20), 2U);
+  EXPECT_EQ(objects({40, 56, 20, 10}, 20), 1U);
+  EXPECT_EQ(objects({40, 57, 20, 10}, 20), 2U);
   EXPECT_EQ(objects({40, 53, 20, 10}, 30), 2U) << "another depth";
 }
 
