@@ -92,7 +92,6 @@ class Replay {
 
   // False if it was interrupted.
   bool run() {
-    catch_interrupts();
     const capture::SourceInfo& info = rig_.source->info();
     if (info.format == PixelFormat::kGrey8) messages_ << info.name << ": grey source, the chroma tests are skipped\n";
     if (!info.stereo) messages_ << info.name << ": mono source, 2-D tracks without distance\n";
@@ -132,9 +131,16 @@ class Replay {
     }
     if (!arguments_.out) return;
     const fs::path folder = *arguments_.out;
-    tracks_.save(folder / "tracks.csv");
-    if (!file_->commit()) throw std::runtime_error(file_->status());
-    save_summary(folder / "summary.json", summary_, &times_);
+    try {
+      tracks_.save(folder / "tracks.csv");
+      if (!file_->commit()) throw std::runtime_error(file_->status());
+      save_summary(folder / "summary.json", summary_, &times_);
+    } catch (const std::runtime_error&) {
+      // All three or none: some of them beside those of an earlier run would look like one run's.
+      std::error_code ignored;
+      for (const char* name : {"tracks.csv", "telemetry.bin", "summary.json"}) fs::remove(folder / name, ignored);
+      throw;
+    }
   }
 
   void print(std::ostream& out) const {
@@ -178,8 +184,8 @@ class Replay {
   void process(const FramePair& pair) {
     pixels_.add(pair.left);
     if (!pair.right.empty()) pixels_.add(pair.right);
-    const std::uint64_t before = allocations_of_this_thread();
     times_.frame_begins();
+    const std::uint64_t before = allocations_of_this_thread();
     const Result<FrameResult> result = pipeline_.run(pair);
     if (!result.has_value()) {
       throw std::runtime_error(rig_.source->info().name + ": pair " + std::to_string(pair.ordinal) + ": " +
@@ -245,6 +251,8 @@ class Replay {
 }  // namespace
 
 int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream& messages) {
+  // First of all: no file may be open yet when ctrl-C would still end the program at once.
+  catch_interrupts();
   Replay replay(arguments, messages);
   if (!replay.run()) {
     throw std::runtime_error(arguments.rig.source + ": interrupted; nothing was written");

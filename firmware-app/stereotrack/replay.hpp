@@ -19,7 +19,8 @@ struct ReplayArguments {
 
 /// Runs a source through the pipeline and writes what was asked for. Progress and skipped frames go to
 /// `messages`, the closing table to `out`. Answers the exit code. Throws config::Error (exit 2) or
-/// std::runtime_error (exit 1), one line; then, and after ctrl-C, no file is left behind.
+/// std::runtime_error (exit 1), one line; then, and after ctrl-C, no file of --out
+/// and no video is left behind unless it was whole before; PNG pictures so far stay, each whole.
 int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream& messages);
 
 /// `stereotrack masks SOURCE --out DIR`: foreground masks, one %06d.png a frame, 255 = object.

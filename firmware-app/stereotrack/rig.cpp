@@ -86,7 +86,12 @@ Rig open_rig(const RigArguments& arguments) {
     options.frames = static_cast<std::uint64_t>(configuration.synthetic.frames);
     options.width = configuration.synthetic.width;
     options.height = configuration.synthetic.height;
-    auto scene = capture::open_synthetic(arguments.source.substr(kSynthetic.size()), options);
+    std::unique_ptr<capture::SyntheticSource> scene;
+    try {
+      scene = capture::open_synthetic(arguments.source.substr(kSynthetic.size()), options);
+    } catch (const capture::SceneError& error) {
+      throw config::Error(error.what());
+    }
     rig.calibration = scene->calibration();
     rig.calibration_name = arguments.source;
     rig.unit_m = 1;

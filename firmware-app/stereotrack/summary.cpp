@@ -59,6 +59,13 @@ std::string Digest::hex() const {
   return text;
 }
 
+void StageTimes::frame_begins() {
+  for (std::vector<double>& ms : ms_) {
+    if (ms.size() == ms.capacity()) ms.reserve(std::max<std::size_t>(1024, 2 * ms.size()));
+  }
+  last_ = std::chrono::steady_clock::now();
+}
+
 void StageTimes::stage_ended(void* context, Stage stage) noexcept {
   auto& self = *static_cast<StageTimes*>(context);
   const auto now = std::chrono::steady_clock::now();

@@ -34,7 +34,8 @@ class Digest {
 class StageTimes {
  public:
   [[nodiscard]] StageObserver observer() noexcept { return {&StageTimes::stage_ended, this}; }
-  void frame_begins() noexcept { last_ = std::chrono::steady_clock::now(); }
+  /// Before each frame: takes the room for its times, so that the observer takes none while the stages run.
+  void frame_begins();
 
   struct Percentiles {
     double p50_ms = 0;

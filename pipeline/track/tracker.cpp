@@ -23,6 +23,9 @@ constexpr double kFeatureCost = 6.0;
 constexpr double kFeatureSpeed = 0.1;
 // What is left beyond the gate for looks: above, a target rather stays alone.
 constexpr double kStranger = 9.0;
+// A target coasts this long [s], and this part of the time for which it was seen, but never over coast_s.
+constexpr double kCoastAnyway = 0.2;
+constexpr double kCoastPart = 0.5;
 // A target of which less than this part would still be in the picture has left.
 constexpr double kVisiblePart = 0.5;
 // Twins: frames, difference of distance and of speed as fractions, and sway of pieces [sizes/s].
@@ -331,7 +334,9 @@ bool Tracker::got_somewhere(const Target& target) const noexcept {
 bool Tracker::expired(const Target& target) const noexcept {
   if (target.measured) return false;
   if (target.state == TrackState::kTentative) return target.misses_in_a_row >= config_.tentative_misses;
-  return target.unseen_s > config_.coast_s ||
+  // Nothing is predicted for much longer than it was seen.
+  const double trusted = kCoastAnyway + kCoastPart * target.hits * dt_;
+  return target.unseen_s > std::min(config_.coast_s, trusted) ||
          static_cast<double>(target.box.area()) < kVisiblePart * target.width * target.height;
 }
 

@@ -31,7 +31,8 @@ namespace stereotrack {
 /// Life: a detection without a target starts a tentative one. It is confirmed by confirm_hits detections if it
 /// has got somewhere meanwhile: at least travel_px in the picture and straight_part of the path it took (flicker
 /// jumps to and fro), or a twentieth of its distance. tentative_misses frames in a row without detection remove it. A confirmed target
-/// without detection coasts on its prediction for coast_s, or until it left the picture.
+/// without detection coasts on its prediction for coast_s, but no longer than 0.2 s and half the time for which it
+/// was seen, or until it left the picture.
 ///
 /// Twins: an object that came into view in pieces has a target for each. Two that share one region for kTwinFrames, at
 /// one depth and of one motion, are one object: the smaller goes.
@@ -47,7 +48,7 @@ class Tracker {
     int tentative_misses = 2;          ///< frames without detection that remove a tentative target, 1..10
     double coast_s = 1.5;              ///< how long a confirmed target lives without detections [s], 0..60
     double gate = 4.0;                 ///< association gate [standard deviations], 1..10
-    double acceleration = 1.2;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
+    double acceleration = 1.5;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
     double initial_speed = 2.0;        ///< uncertainty of a new target's speed as a fraction of its distance [1/s]
     double centre_noise_px = 0.7;      ///< noise of a box centre [px], 0.05..20
     double centre_noise_size = 0.05;   ///< and what it grows by with the box's size [1], 0..1

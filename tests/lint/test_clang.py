@@ -63,7 +63,6 @@ BAD_TIDY = {
     "readability-misleading-indentation": "void g(); void f(bool a) {\n  if (a)\n    g();\n    g();\n}",
     "readability-simplify-boolean-expr": "bool f(bool a) { if (a) return true; else return false; }",
     "readability-redundant-control-flow": "void g(); void f() { g(); return; }",
-    "readability-static-accessed-through-instance": "struct A { static int f(); }; int g(A a) { return a.f(); }",
 }
 # Names: what each must not be called. [readability-identifier-naming] must fire in every one.
 BAD_NAMES = {

@@ -6,7 +6,11 @@
 #include "tests/support/score/score_main.hpp"
 
 int main(int argc, char** argv) {
-  using namespace stereotrack::score;
+  using stereotrack::score::DisparityScore;
+  using stereotrack::score::Figures;
+  using stereotrack::score::read_estimate;
+  using stereotrack::score::score_disparity;
+  using stereotrack::score::score_main;
   std::filesystem::path truth_file;
   std::filesystem::path right_file;
   std::filesystem::path mask_file;

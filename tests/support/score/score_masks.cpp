@@ -4,7 +4,10 @@
 #include "tests/support/score/score_main.hpp"
 
 int main(int argc, char** argv) {
-  using namespace stereotrack::score;
+  using stereotrack::score::Figures;
+  using stereotrack::score::MaskScore;
+  using stereotrack::score::score_main;
+  using stereotrack::score::score_mask_folders;
   std::filesystem::path truth;
   std::filesystem::path masks;
   std::size_t skip = 100;

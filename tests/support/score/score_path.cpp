@@ -40,7 +40,8 @@ std::string ids_of(const PathScore& score) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  using namespace stereotrack;
+  namespace evaluation = stereotrack::evaluation;
+  namespace score = stereotrack::score;
   std::filesystem::path tracks;
   std::string model = "line";
   PathSpec spec;

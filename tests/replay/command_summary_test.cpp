@@ -1,0 +1,92 @@
+// summary.json says what a run was and did; among it that the frame loop took nothing from the heap.
+#include "tests/replay/command_support.hpp"
+
+namespace stereotrack::test {
+namespace {
+
+// A sanitizer's own malloc cannot be counted: the program then says null.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+const nlohmann::ordered_json kNoAllocation = nullptr;
+#else
+const nlohmann::ordered_json kNoAllocation = 0;
+#endif
+
+enum class Source { kColour, kGrey, kMono };
+
+using SummaryCase = std::tuple<const char*, Source>;
+
+class Summary : public testing::TestWithParam<SummaryCase> {
+ protected:
+  void SetUp() override {
+    const auto [preset, source] = GetParam();
+    SmallScene::write(folder_ / "scene", 45, source == Source::kGrey ? Paint::kGrey : Paint::kColour);
+    const std::string scene = (folder_ / "scene").string();
+    const ProgramResult result =
+        stereotrack_command({"replay", source == Source::kMono ? "mono:" + scene + "/left" : scene, "--out",
+                             out_.string(), "--set", std::string("preset=") + preset});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  TempDir folder_;
+  fs::path out_ = folder_ / "out";
+};
+
+TEST_P(Summary, NoHeapCallAfterWarmUp) {
+  const nlohmann::ordered_json summary = summary_of(out_);
+  ASSERT_TRUE(summary.contains("allocations_after_warmup"));
+  EXPECT_EQ(summary["allocations_after_warmup"], kNoAllocation);
+  EXPECT_EQ(summary["frames"], 45);
+  EXPECT_GE(summary["tracks"], 1) << "nothing moved: not every stage had work to do";
+}
+
+TEST_P(Summary, SaysWhatTheRunWasAndDid) {
+  const nlohmann::ordered_json summary = summary_of(out_);
+  const std::vector<CsvRow> rows = rows_of(out_ / "tracks.csv");
+  EXPECT_EQ(summary["mono"], std::get<1>(GetParam()) == Source::kMono);
+  EXPECT_EQ(summary["colour"], std::get<1>(GetParam()) != Source::kGrey);
+  EXPECT_EQ(summary["rows"], rows.size());
+  EXPECT_EQ(summary["deadline_misses"], 0);
+  EXPECT_EQ(summary["drops"]["unreadable"], 0);
+  EXPECT_EQ(summary["drops"]["telemetry_failed"], 0);
+  EXPECT_EQ(summary["skipped"], nlohmann::ordered_json::array());
+  EXPECT_GE(summary["telemetry_datagrams"], 45);
+  EXPECT_GT(summary["memory_bytes"], 0);
+  for (const char* hash : {"pixels_blake2b", "telemetry_blake2b"}) {
+    const std::string digits = summary[hash];
+    EXPECT_EQ(digits.size(), 64U);
+    EXPECT_EQ(digits.find_first_not_of("0123456789abcdef"), std::string::npos) << digits;
+  }
+  const std::string configuration = summary["configuration"];
+  EXPECT_NE(configuration.find(std::string("preset = \"") + std::get<0>(GetParam()) + "\""), std::string::npos);
+  ASSERT_GT(summary["stages_ms"].size(), 1U);
+  ASSERT_TRUE(summary["stages_ms"].contains("whole"));
+  for (const auto& [stage, times] : summary["stages_ms"].items()) {
+    EXPECT_GE(times["p50"], 0.0) << stage;
+    EXPECT_LE(times["p50"], times["p99"]) << stage;
+    EXPECT_LE(times["p99"], times["max"]) << stage;
+  }
+  EXPECT_GT(summary["stages_ms"]["whole"]["p50"], 0.0);
+}
+
+std::string case_name(const testing::TestParamInfo<SummaryCase>& instance) {
+  const auto [preset, source] = instance.param;
+  return std::string(preset) + (source == Source::kColour ? "Colour" : (source == Source::kGrey ? "Grey" : "Mono"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sources, Summary,
+                         testing::Combine(testing::Values("robust", "thesis"),
+                                          testing::Values(Source::kColour, Source::kGrey, Source::kMono)),
+                         case_name);
+
+// Many objects, occlusions and more frames than the buffers of the stage times begin with.
+TEST(SummaryOfEleven, NoHeapCallAfterWarmUp) {
+  const TempDir folder;
+  const ProgramResult result =
+      stereotrack_command({"replay", "synthetic:eleven", "--out", (folder / "out").string(), "--set",
+                           "synthetic.frames=1100", "--set", "synthetic.width=96", "--set", "synthetic.height=72"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(summary_of(folder / "out")["allocations_after_warmup"], kNoAllocation);
+}
+
+}  // namespace
+}  // namespace stereotrack::test

@@ -1,0 +1,201 @@
+#!/usr/bin/env bash
+# Measures the figures of docs/QUALITY.md and prints its tables (Markdown).
+#   tests/replay/measure_quality.sh BUILD_DIR [DATA_DIR [SECTION...]]
+# SECTION: conveyor people baseball eleven middlebury highway; all without one. SEEDS="1 2 3 4 5" for more of eleven.
+set -euo pipefail
+
+die() {
+  printf 'measure_quality.sh: %s\n' "$1" >&2
+  exit "${2:-1}"
+}
+
+[[ $# -ge 1 ]] || die "usage: measure_quality.sh BUILD_DIR [DATA_DIR [SECTION...]]" 2
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+build=$(cd "$1" && pwd)
+data=${2:-$root/../shared/data}
+sections=("${@:3}")
+((${#sections[@]})) || sections=(conveyor people baseball eleven middlebury highway)
+stereotrack=$build/bin/stereotrack
+for program in "$stereotrack" "$build"/tests/score_{masks,disparity,path}; do
+  [[ -x $program ]] || die "$program: not there; build it first"
+done
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# Runs quietly; what it said is shown only when it fails.
+quiet() { "$@" >"$work/log" 2>&1 || die "$* failed: $(tail -n 1 "$work/log")"; }
+
+# The value of a line "NAME VALUE" of a scorer, from stdin.
+value() { awk -v name="$1" '$1 == name {print $2}'; }
+percent() { awk -v name="$1" '$1 == name {printf "%.1f", 100 * $2}'; }
+
+replay() {
+  local out=$1 source=$2
+  shift 2
+  quiet "$stereotrack" replay "$source" --out "$out" "$@"
+}
+
+# Tracks with a row in frames A..B.
+ids_in() { awk -F, -v a="$2" -v b="$3" '$1 >= a && $1 <= b && !($2 in s) {s[$2]; n++} END {print n + 0}' "$1"; }
+
+measure_conveyor() {
+  local source=$data/dtu_conveyor_stereo tracks=$work/conveyor/tracks.csv box line
+  replay "$work/conveyor" "$source" --calibration "$source/derived_stereo_calibration.yml"
+  box=$("$build/tests/score_path" --tracks "$tracks" --frames 106:252)
+  line=$("$build/tests/score_path" --tracks "$tracks" --frames 180:250 --id "$(value id <<<"$box")")
+  cat <<END
+| conveyor | measured | target |
+|---|---|---|
+| best track's share of frames 106-252, % | $(percent coverage <<<"$box") | 95 |
+| tracks in frames 106-252 (box, hands, others) | $(value ids <<<"$box") | one on the box |
+| the box's track in frames 180-250, % | $(percent coverage <<<"$line") | 95 |
+| residual from a straight line at constant speed, 180-250, squares | $(value rms_3d <<<"$line") | 0.07 |
+| speed, squares a frame | $(value speed_a_frame <<<"$line") | 0.173 |
+| tracks on the empty belt, frames 1-80 | $(ids_in "$tracks" 1 80) | 0 |
+
+Rows of each track in frames 106-252 as [track, rows]: $(sed -n 's/^rows_of_ids *//p' <<<"$box")
+
+END
+}
+
+# A track belongs to the pass in which at least half of its rows lie.
+measure_people() {
+  local source=$data/stereo_people_overhead
+  replay "$work/people" "sbs:$source/my_video_sbs_640x240.avi" --calibration "$source/calibration_as_stored.yml"
+  cat <<END
+| overhead people | measured | target |
+|---|---|---|
+$(awk -F, '
+    function pass(f) {
+      return f >= 57 && f <= 81 ? 1 : f >= 102 && f <= 120 ? 2 : f >= 138 && f <= 174 ? 3 : f >= 207 && f <= 237 ? 4 : 0
+    }
+    {rows[$2]++; in_pass[$2, pass($1)]++}
+    END {
+      split("57-81 102-120 138-174 207-237", name, " ")
+      for (id in rows) {
+        home = 0
+        for (p = 1; p <= 4; p++) if (2 * in_pass[id, p] >= rows[id]) home = p
+        tracks[home]++
+        if (in_pass[id, home] > longest[home]) longest[home] = in_pass[id, home]
+      }
+      for (p = 1; p <= 4; p++)
+        printf "| tracks in pass %s (rows of the longest) | %d (%d) | 1 |\n", name[p], tracks[p], longest[p]
+      printf "| tracks outside of the passes | %d | only the feet in the corner |\n", tracks[0]
+    }' "$work/people/tracks.csv")
+
+END
+}
+
+# The ball flies towards the rig at about 10 inches a frame: of the tracks that move faster than 5, the longest.
+ball_of() {
+  local tracks=$1 frames=$2 id path speed rows best=0 ball=
+  for id in $(cut -d, -f2 "$tracks" | sort -nu); do
+    path=$("$build/tests/score_path" --tracks "$tracks" --frames "$frames" --id "$id" --model ballistic 2>/dev/null) || continue
+    speed=$(value speed_a_frame <<<"$path")
+    rows=$(value rows <<<"$path")
+    if awk -v s="$speed" 'BEGIN {exit !(s > 5)}' && ((rows > best)); then best=$rows ball=$id; fi
+  done
+  [[ -n $ball ]] || die "$tracks: no track flies"
+  printf '%s\n' "$ball"
+}
+
+measure_baseball() {
+  local source=$data/baseball_stereo_slow126 pitch first last tracks ball path confirmed
+  cat <<END
+| pitch | ball visible | first row | confirmed in frame | coverage % (90) | residual x y z, rms, inches | inches a frame |
+|---|---|---|---|---|---|---|
+END
+  while read -r pitch first last; do
+    replay "$work/$pitch" "$source/$pitch" --calibration "$source/calibration.yml"
+    tracks=$work/$pitch/tracks.csv
+    ball=$(ball_of "$tracks" "$first:$last")
+    path=$("$build/tests/score_path" --tracks "$tracks" --frames "$first:$last" --id "$ball" --model ballistic)
+    # A track's tentative frames are written once it is confirmed: the shortest replay that has rows tells when.
+    for ((confirmed = first + 1; confirmed < last; confirmed++)); do
+      replay "$work/cut" "$source/$pitch" --calibration "$source/calibration.yml" --frames "1:$confirmed"
+      [[ $(awk -F, -v id="$ball" '$2 == id' "$work/cut/tracks.csv") ]] && break
+    done
+    printf '| %s | %s-%s | %s | %s | %s | %.2f %.2f %.2f | %.1f |\n' "$pitch" "$first" "$last" \
+      "$(awk -F, -v id="$ball" '$2 == id {print $1; exit}' "$tracks")" "$confirmed" "$(percent coverage <<<"$path")" \
+      "$(value rms_x <<<"$path")" "$(value rms_y <<<"$path")" "$(value rms_z <<<"$path")" \
+      "$(value speed_a_frame <<<"$path")"
+  done <<<$'one_pitch 5 42\ntwo_pitch 6 43'
+  echo
+}
+
+measure_eleven() {
+  local seed folder
+  cat <<END
+| seed | HOTA | IDF1 (0.90) | MOTA | IDSW | 3-D error median | 95 % |
+|---|---|---|---|---|---|---|
+END
+  for seed in ${SEEDS:-1 2 3}; do
+    folder=$work/eleven$seed
+    quiet "$stereotrack" synth eleven --seed "$seed" --out "$folder"
+    replay "$folder/out" "$folder"
+    "$stereotrack" eval --truth "$folder/gt.csv" --tracks "$folder/out/tracks.csv" --json >"$folder/eval.json"
+    python3 - "$seed" "$folder/eval.json" <<'END'
+import json, sys
+s = json.load(open(sys.argv[2]))
+print("| %s | %.3f | %.3f | %.3f | %d | %.4f | %.4f |" % (sys.argv[1], s["HOTA"], s["IDF1"], s["MOTA"], s["IDSW"],
+      s["error_3d"]["median"], s["error_3d"]["p95"]))
+END
+    rm -rf "$folder"
+  done
+  echo
+}
+
+measure_middlebury() {
+  local preset pair range left right score
+  local -a truth
+  cat <<END
+| preset | pair | disparity.max | density % | bad-1 % (valid) | bad-2 % (valid) | bad-2 % (all) |
+|---|---|---|---|---|---|---|
+END
+  for preset in robust thesis; do
+    while read -r pair range left right truth[0] truth[1] truth[2] truth[3] truth[4]; do
+      truth[3]=${truth[3]/#@/$data/middlebury_stereo/$pair/}
+      quiet "$stereotrack" disparity "$data/middlebury_stereo/$pair/$left" "$data/middlebury_stereo/$pair/$right" \
+        --config "$root/config/presets/$preset.toml" --set "disparity.max=$range" --out "$work/disparity.png"
+      score=$("$build/tests/score_disparity" --truth "$data/middlebury_stereo/$pair/${truth[0]}" --scale "${truth[1]}" \
+        "${truth[2]}" "${truth[3]}" --disparity "$work/disparity.png")
+      printf '| %s | %s | %s | %s | %s | %s | %s |\n' "$preset" "$pair" "$range" "$(percent density <<<"$score")" \
+        "$(percent bad_1 <<<"$score")" "$(percent bad_2 <<<"$score")" "$(percent bad_2_of_all <<<"$score")"
+    done <<END | tee "$work/rows"
+Cones 64 im2.png im6.png disp2.png 4 --truth-right @disp6.png
+Teddy 64 im2.png im6.png disp2.png 4 --truth-right @disp6.png
+Dolls 96 view1.png view5.png disp1.png 3 --truth-right @disp5.png
+Cloth3 96 view1.png view5.png disp1.png 2 --truth-right @disp5.png
+Adirondack 96 Adirondack_left.png Adirondack_right.png Adirondack_gt.png 1 --mask @Adirondack_mask.png
+END
+    awk -F'|' -v preset="$preset" '
+      {for (i = 5; i <= 8; i++) sum[i] += $i}
+      END {printf "| %s | **mean** | | %.1f | %.1f | %.1f | %.1f |\n", preset, sum[5] / NR, sum[6] / NR, sum[7] / NR, sum[8] / NR}
+    ' "$work/rows"
+  done
+  echo
+}
+
+measure_highway() {
+  local source=$data/cdnet_highway preset score
+  cat <<END
+| preset | F | precision | recall | shadow pixels kept % |
+|---|---|---|---|---|
+END
+  for preset in robust thesis; do
+    quiet "$stereotrack" masks "mono:$source/input" --config "$root/config/presets/$preset.toml" --out "$work/$preset"
+    score=$("$build/tests/score_masks" --truth "$source/groundtruth" --masks "$work/$preset")
+    printf '| %s | %.3f | %.3f | %.3f | %s |\n' "$preset" "$(value f_measure <<<"$score")" \
+      "$(value precision <<<"$score")" "$(value recall <<<"$score")" "$(percent shadow_rate <<<"$score")"
+  done
+  echo
+}
+
+for section in "${sections[@]}"; do
+  case $section in
+    conveyor | people | baseball | eleven | middlebury | highway) ;;
+    *) die "no section $section" 2 ;;
+  esac
+  [[ $section == eleven || -d $data ]] || die "$data: no recordings there; give their folder as DATA_DIR"
+  "measure_$section"
+done
