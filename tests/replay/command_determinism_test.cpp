@@ -57,7 +57,6 @@ class Determinism : public testing::TestWithParam<const char*> {
     const ProgramResult result =
         stereotrack_command({"synth", "eleven", "--out", sequence_.string(), "--frames", "120", "--size", "320x240"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
-    replay(sequence_.string(), folder_ / "whole", preset_);
   }
 
   TempDir folder_;
@@ -66,17 +65,18 @@ class Determinism : public testing::TestWithParam<const char*> {
 };
 
 TEST_P(Determinism, SameFolderTwiceGivesTheSameBytes) {
-  replay(sequence_.string(), folder_ / "again", preset_);
+  for (const char* name : {"whole", "again"}) replay(sequence_.string(), folder_ / name, preset_);
   expect_same_results(folder_ / "whole", folder_ / "again");
 }
 
 TEST_P(Determinism, ShorterRunGivesTheRowsOfTheWholeOneUpToItsEnd) {
+  replay(sequence_.string(), folder_ / "whole", preset_);
   const std::vector<CsvRow> whole = rows_of(folder_ / "whole/tracks.csv");
   const std::map<std::uint32_t, std::uint64_t> confirmed = confirmed_at(folder_ / "whole/telemetry.bin");
   const std::string datagrams = read_text(folder_ / "whole/telemetry.bin");
   ASSERT_GE(confirmed.size(), 3U);
   std::size_t compared = 0;
-  for (const std::uint64_t end : {1U, 20U, 61U, 97U, 119U}) {
+  for (const std::uint64_t end : {1U, 47U, 78U, 103U}) {
     const fs::path out = folder_ / ("to-" + std::to_string(end));
     std::vector<std::string> arguments = preset_;
     arguments.insert(arguments.end(), {"--frames", "1:" + std::to_string(end)});
@@ -99,11 +99,12 @@ TEST_P(Determinism, ShorterRunGivesTheRowsOfTheWholeOneUpToItsEnd) {
 TEST_P(Determinism, PicturesAreTheSame) {
   for (const char* name : {"first", "second"}) {
     std::vector<std::string> arguments = preset_;
-    arguments.insert(arguments.end(), {"--frames", "1:25", "--render", (folder_ / name).string()});
+    arguments.insert(arguments.end(), {"--frames", "30:44", "--render", (folder_ / name).string()});
     replay(sequence_.string(), folder_ / "out", arguments);
   }
   const std::vector<std::string> names = names_in(folder_ / "first");
-  ASSERT_EQ(names.size(), 25U);
+  ASSERT_EQ(names.size(), 15U);
+  EXPECT_GT(fs::file_size(folder_ / "out/tracks.csv"), 0U) << "nothing to draw";
   EXPECT_EQ(names, names_in(folder_ / "second"));
   std::set<std::string> different;
   for (const std::string& name : names) {
@@ -121,8 +122,13 @@ class SyntheticDeterminism : public testing::TestWithParam<const char*> {};
 
 TEST_P(SyntheticDeterminism, SameSceneTwiceGivesTheSameBytes) {
   const TempDir folder;
-  const std::vector<std::string> arguments{"--set", std::string("preset=") + GetParam(), "--set",
-                                           "synthetic.frames=30"};
+  const std::vector<std::string> arguments{"--set",
+                                           std::string("preset=") + GetParam(),
+                                           "synthetic.frames=60",
+                                           "--set",
+                                           "synthetic.width=320",
+                                           "--set",
+                                           "synthetic.height=240"};
   replay("synthetic:eleven", folder / "first", arguments);
   replay("synthetic:eleven", folder / "second", arguments);
   expect_same_results(folder / "first", folder / "second");

@@ -28,6 +28,7 @@ inline std::string read_text(const std::filesystem::path& path) {
 struct ProgramOptions {
   std::chrono::milliseconds limit{120'000};  ///< then it is killed
   /// Largest file it may write [bytes], 0 = any. SIGXFSZ is ignored, so that writing fails as on a full disk.
+  /// Its stdout and stderr are files too: leave room for the lines expected.
   rlim_t most_file_bytes = 0;
   int signal = 0;  ///< sent once, `signal_after` after `signal_when` holds
   std::chrono::milliseconds signal_after{0};

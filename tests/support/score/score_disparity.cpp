@@ -8,7 +8,10 @@
 int main(int argc, char** argv) {
   using stereotrack::score::DisparityScore;
   using stereotrack::score::Figures;
+  using stereotrack::score::non_occluded;
   using stereotrack::score::read_estimate;
+  using stereotrack::score::read_scored_mask;
+  using stereotrack::score::read_truth;
   using stereotrack::score::score_disparity;
   using stereotrack::score::score_main;
   std::filesystem::path truth_file;
