@@ -131,10 +131,11 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
   const std::int64_t hole = edges ? ContourFill::kUnlimited : shape.hole_px;
   if (!keep(contour_fill_, ContourFill::create({.max_hole_px = hole}, width, height, arena), outcome) ||
       !keep(opening_, Opening::create({.repeats = shape.opening}, width, height, arena), outcome) ||
-      !keep(blob_extractor_,
-            BlobExtractor::create({.max_runs = kMaxRuns, .max_blobs = shape.max_blobs, .min_area_px = shape.min_blob_px},
-                                  width, height, arena),
-            outcome) ||
+      !keep(
+          blob_extractor_,
+          BlobExtractor::create({.max_runs = kMaxRuns, .max_blobs = shape.max_blobs, .min_area_px = shape.min_blob_px},
+                                width, height, arena),
+          outcome) ||
       !keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, arena), outcome)) {
     return outcome;
   }
@@ -156,33 +157,43 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
   const DisparityRange dense{0, disparity.max};
   if (disparity.method == MatchMethod::kSad) {
     if (!keep(sad_,
-              SadMatcher::create({.width = canvas.width_left, .height = canvas.height, .right_width = canvas.width_right,
-                                  .offset = canvas.offset, .block = disparity.block, .range = dense,
+              SadMatcher::create({.width = canvas.width_left,
+                                  .height = canvas.height,
+                                  .right_width = canvas.width_right,
+                                  .offset = canvas.offset,
+                                  .block = disparity.block,
+                                  .range = dense,
                                   .region_disparities = full_range_ + 1},
                                  arena),
               outcome)) {
       return outcome;
     }
   } else if (!keep(census_,
-                   CensusMatcher::create({.width = canvas.width_left, .height = canvas.height,
-                                          .right_width = canvas.width_right, .offset = canvas.offset,
-                                          .block = disparity.block, .range = dense,
-                                          .region_disparities = full_range_ + 1, .filter = {.fill_px = 0}},
+                   CensusMatcher::create({.width = canvas.width_left,
+                                          .height = canvas.height,
+                                          .right_width = canvas.width_right,
+                                          .offset = canvas.offset,
+                                          .block = disparity.block,
+                                          .range = dense,
+                                          .region_disparities = full_range_ + 1,
+                                          .filter = {.fill_px = 0}},
                                          arena),
                    outcome)) {
     return outcome;
   }
   if (!keep(region_matcher_,
-            RegionMatcher::create({.width = canvas.width_left, .height = canvas.height,
-                                   .right_width = canvas.width_right, .offset = canvas.offset,
+            RegionMatcher::create({.width = canvas.width_left,
+                                   .height = canvas.height,
+                                   .right_width = canvas.width_right,
+                                   .offset = canvas.offset,
                                    .disparities = full_range_ + 1},
                                   arena),
             outcome)) {
     return outcome;
   }
   if (config_.background.method == ForegroundMethod::kAdaptive) {
-    if (!keep(background_right_,
-              AdaptiveBackground::create(config_.background.adaptive, width, height, false, arena), outcome) ||
+    if (!keep(background_right_, AdaptiveBackground::create(config_.background.adaptive, width, height, false, arena),
+              outcome) ||
         !keep(foreground_right_, ForegroundMask::create(config_.foreground, width, height, arena), outcome)) {
       return outcome;
     }
@@ -204,7 +215,9 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
 
 Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   const bool stereo = rectifier_.has_value();
-  const auto fits = [&](const Picture& picture) { return picture.width == setup_.width && picture.height == setup_.height; };
+  const auto fits = [&](const Picture& picture) {
+    return picture.width == setup_.width && picture.height == setup_.height;
+  };
   if (!fits(pair.left) || (stereo && !fits(pair.right))) return fail(Fault::kBadSize);
   if (setup_.colour && pair.left.format != PixelFormat::kBgr8) return fail(Fault::kBadFormat);
   const double dt = started_ ? std::max(seconds_between(last_time_, pair.capture_time), 0.0) : 0.0;
@@ -215,10 +228,10 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   ingest(pair);  // gray 3.1, equalisation 3.2-3.5, chroma 3.17-3.19
   ended(Stage::kIngest);
   predictions_ = tracker_->predict(dt, left_.y);  // 3.24, 3.26, 3.27: bounds the searches below
-  find_foreground();                     // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
-  ended(Stage::kForeground);             // contours, opening 3.13-3.15, blobs
-  refine_blobs();                        // convex hull 3.16, level set
-  if (stereo) find_disparity();          // block matching 3.6, where something moves
+  find_foreground();                              // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
+  ended(Stage::kForeground);                      // contours, opening 3.13-3.15, blobs
+  refine_blobs();                                 // convex hull 3.16, level set
+  if (stereo) find_disparity();                   // block matching 3.6, where something moves
   ended(Stage::kDisparity);
   remove_shadows();  // sigma test 3.20-3.23, or stereo first
   ended(Stage::kShadow);
@@ -384,8 +397,9 @@ Rect Pipeline::paint_on_canvas(const Rect& box, std::uint16_t label) noexcept {
   if (right < left) return {};
   const int u = static_cast<int>(std::floor(left)) - 1;
   const int v = static_cast<int>(std::floor(top)) - 1;
-  const Rect roi = intersect({u, v, static_cast<int>(std::ceil(right)) + 2 - u, static_cast<int>(std::ceil(bottom)) + 2 - v},
-                             {0, 0, wanted_.width, wanted_.height});
+  const Rect roi =
+      intersect({u, v, static_cast<int>(std::ceil(right)) + 2 - u, static_cast<int>(std::ceil(bottom)) + 2 - v},
+                {0, 0, wanted_.width, wanted_.height});
   const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
   for (int y = roi.top; y < roi.bottom(); ++y) {
     for (int x = roi.left; x < roi.right(); ++x) {
@@ -474,8 +488,7 @@ ShadowTest::Input Pipeline::shadow_input() const noexcept {
 void Pipeline::measure_strength() noexcept {
   for (const Blob& blob : blobs_.blobs) {
     std::array<std::int32_t, 256> histogram{};
-    for_each_pixel(blobs_.labels, blob.box, blob.label,
-                   [&](int x, int y) { ++histogram[left_.distance.at(x, y)]; });
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { ++histogram[left_.distance.at(x, y)]; });
     std::int32_t above = 0;
     int level = 255;
     while (level > 0 && (above + histogram[static_cast<std::size_t>(level)]) * 4 < blob.area) {
@@ -529,7 +542,8 @@ void Pipeline::remove_shadows() noexcept {
   }
   for (const Blob& blob : blobs_.blobs) {
     std::int32_t rest = 0;
-    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { rest += left_.mask.at(x, y) != 0 ? 1 : 0; });
+    for_each_pixel(blobs_.labels, blob.box, blob.label,
+                   [&](int x, int y) { rest += left_.mask.at(x, y) != 0 ? 1 : 0; });
     if (rest * 100 >= blob.area * kShadowRestPercent) continue;
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { left_.mask.at(x, y) = 0; });
     if (blob.area > 0) ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];

@@ -25,8 +25,8 @@ namespace stereotrack {
 enum class Stage : std::uint8_t { kIngest, kForeground, kDisparity, kShadow, kObjects, kTracking, kBackground };
 inline constexpr std::size_t kStages = 7;
 [[nodiscard]] constexpr const char* to_string(Stage stage) noexcept {
-  constexpr std::array<const char*, kStages> kNames{"ingest", "foreground", "disparity", "shadow",
-                                                    "objects", "tracking", "background"};
+  constexpr std::array<const char*, kStages> kNames{"ingest",  "foreground", "disparity", "shadow",
+                                                    "objects", "tracking",   "background"};
   return kNames[static_cast<std::size_t>(stage)];
 }
 
@@ -48,12 +48,12 @@ enum FrameFlag : std::uint32_t {
 struct FrameResult {
   std::uint64_t ordinal = 0;
   CaptureTime capture_time{};
-  std::uint32_t flags = 0;                 ///< FrameFlag bits
-  std::span<const TrackReport> tracks;     ///< in the order of their ids
-  ImageView<const std::uint8_t> mask;      ///< final object mask, raw left picture, 0 or 255
-  ImageView<const std::uint16_t> labels;   ///< detection of each pixel, 0 = none
+  std::uint32_t flags = 0;                ///< FrameFlag bits
+  std::span<const TrackReport> tracks;    ///< in the order of their ids
+  ImageView<const std::uint8_t> mask;     ///< final object mask, raw left picture, 0 or 255
+  ImageView<const std::uint16_t> labels;  ///< detection of each pixel, 0 = none
   std::span<const Detection> detections;
-  RejectionCounts rejections{};            ///< candidates rejected, by Rejection
+  RejectionCounts rejections{};  ///< candidates rejected, by Rejection
 };
 
 /// The whole algorithm: pairs in, targets out. A function of its state, the pixels and the capture times.
@@ -62,16 +62,15 @@ struct FrameResult {
 class Pipeline {
  public:
   struct Setup {
-    int width = 0;        ///< of one raw picture [px]
-    int height = 0;       ///< [px]
-    bool colour = false;  ///< the source gives kBgr8
+    int width = 0;                                   ///< of one raw picture [px]
+    int height = 0;                                  ///< [px]
+    bool colour = false;                             ///< the source gives kBgr8
     const StereoCalibration* calibration = nullptr;  ///< null: mono
     StageObserver observer;
   };
 
   /// Faults: those of the stages. The arena must outlive the pipeline.
-  [[nodiscard]] static Result<Pipeline> create(const PipelineConfig& config, const Setup& setup,
-                                               Arena& arena) noexcept;
+  [[nodiscard]] static Result<Pipeline> create(const PipelineConfig& config, const Setup& setup, Arena& arena) noexcept;
 
   /// Faults, state untouched: kBadSize, kBadFormat.
   [[nodiscard]] Result<FrameResult> run(const FramePair& pair) noexcept;
@@ -139,10 +138,10 @@ class Pipeline {
   Planes left_;
   Planes right_;
   ImageView<std::uint8_t> scratch_;
-  ImageView<std::uint8_t> moving_;            ///< what learn() of the left background is told
-  ImageView<std::uint16_t> disparity_;        ///< raw left picture [1/16 px]
-  ImageView<std::uint16_t> old_disparity_;    ///< the background's, raw left picture
-  ImageView<std::uint8_t> wanted_;            ///< canvas: pixels to be matched
+  ImageView<std::uint8_t> moving_;          ///< what learn() of the left background is told
+  ImageView<std::uint16_t> disparity_;      ///< raw left picture [1/16 px]
+  ImageView<std::uint16_t> old_disparity_;  ///< the background's, raw left picture
+  ImageView<std::uint8_t> wanted_;          ///< canvas: pixels to be matched
   ImageView<std::uint16_t> canvas_labels_;
   ImageView<std::uint16_t> canvas_disparity_;
   ImageView<std::uint16_t> canvas_background_;  ///< background's disparity, renewed a strip of rows a frame

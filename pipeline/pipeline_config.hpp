@@ -42,13 +42,13 @@ struct BackgroundConfig {
 };
 
 struct ShapeConfig {
-  int edge_threshold = 60;     ///< (3.12) on the Sobel magnitude of the difference [grey levels], 1..255
-  int opening = 1;             ///< 3x3 openings, 0..10
-  int closing = 1;             ///< 3x3 closings, 0..10
-  int hole_px = 3000;           ///< holes up to this area are filled, 0..10^6 [px]; kEdges fills all
-  int max_blobs = 128;         ///< 1..1024
-  int min_blob_px = 20;        ///< smaller blobs are not looked at, 1..10^6 [px]
-  bool level_set = false;      ///< refine each blob's region by the level set
+  int edge_threshold = 60;  ///< (3.12) on the Sobel magnitude of the difference [grey levels], 1..255
+  int opening = 1;          ///< 3x3 openings, 0..10
+  int closing = 1;          ///< 3x3 closings, 0..10
+  int hole_px = 3000;       ///< holes up to this area are filled, 0..10^6 [px]; kEdges fills all
+  int max_blobs = 128;      ///< 1..1024
+  int min_blob_px = 20;     ///< smaller blobs are not looked at, 1..10^6 [px]
+  bool level_set = false;   ///< refine each blob's region by the level set
   LevelSet::Config level_set_config;
 };
 

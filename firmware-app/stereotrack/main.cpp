@@ -19,8 +19,9 @@ constexpr int kBadUsage = 2;
 
 void add_rig_options(CLI::App& command, stereotrack::RigArguments& rig) {
   command
-      .add_option("source", rig.source,
-                  "mav0 folder, KITTI folder, folder with left/ right/, sbs:FILE, LEFT,RIGHT, mono:PATH or synthetic:NAME")
+      .add_option(
+          "source", rig.source,
+          "mav0 folder, KITTI folder, folder with left/ right/, sbs:FILE, LEFT,RIGHT, mono:PATH or synthetic:NAME")
       ->required();
   command.add_option("--calibration", rig.calibration, "calibration file; else that of the source's folder");
   command.add_option("--config", rig.config, "configuration (TOML); else stereotrack.toml of the source's folder");
@@ -55,7 +56,8 @@ int run(int argc, char** argv) {
   stereotrack::add_options(*synth_command, synth);
 
   stereotrack::EvalArguments eval;
-  CLI::App* eval_command = app.add_subcommand("eval", "scores tracks against ground truth: HOTA, MOTA, IDF1, 3-D error");
+  CLI::App* eval_command =
+      app.add_subcommand("eval", "scores tracks against ground truth: HOTA, MOTA, IDF1, 3-D error");
   eval_command->add_option("--truth", eval.truth, "ground truth, MOT columns")->required();
   eval_command->add_option("--tracks", eval.tracks, "tracks, MOT columns")->required();
   eval_command->add_flag("--json", eval.json, "one JSON object instead of the table");

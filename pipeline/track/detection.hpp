@@ -11,12 +11,12 @@ namespace stereotrack {
 
 /// One object candidate of one frame: what the tracker is fed with.
 struct Detection {
-  Rect box;                     ///< tight, raw left picture [px]
-  FixedVector<Point, 48> hull;  ///< convex hull, raw left picture, clockwise on the screen
-  int area = 0;                 ///< pixels of its mask
-  bool has_depth = false;       ///< the fields up to position_covariance are known
-  double disparity = 0;         ///< median over its mask [px]
-  double disparity_sd = 0;      ///< standard deviation of that median [px]
+  Rect box;                                            ///< tight, raw left picture [px]
+  FixedVector<Point, 48> hull;                         ///< convex hull, raw left picture, clockwise on the screen
+  int area = 0;                                        ///< pixels of its mask
+  bool has_depth = false;                              ///< the fields up to position_covariance are known
+  double disparity = 0;                                ///< median over its mask [px]
+  double disparity_sd = 0;                             ///< standard deviation of that median [px]
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
   std::array<std::uint8_t, 3> colour{};  ///< mean Y, Cb, Cr over its mask; Cb = Cr = 128 for grey sources
@@ -33,11 +33,11 @@ struct Prediction {
   bool confirmed = false;
   std::uint64_t apart = 0;   ///< bit id % 64 of each target that was seen beside this one, each a region of its own
   bool independent = false;  ///< has been seen as a region of its own, not only cut out of another's
-  Rect box;                 ///< expected box, raw left picture, may reach outside [px]
-  double area = 0;          ///< expected pixels of its mask
-  double vx = 0;            ///< velocity of its centre in the picture [px/s]
+  Rect box;                  ///< expected box, raw left picture, may reach outside [px]
+  double area = 0;           ///< expected pixels of its mask
+  double vx = 0;             ///< velocity of its centre in the picture [px/s]
   double vy = 0;
-  double image_sd = 0;      ///< standard deviation of its centre, the larger axis [px]
+  double image_sd = 0;  ///< standard deviation of its centre, the larger axis [px]
   bool has_depth = false;
   double disparity = 0;     ///< [px]
   double disparity_sd = 0;  ///< from the state's covariance [px]

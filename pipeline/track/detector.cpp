@@ -41,8 +41,8 @@ int gap(const Rect& a, const Rect& b) noexcept {
 
 Result<Detector> Detector::create(const Config& config, int width, int height, Arena& arena) noexcept {
   if (config.min_area_px < 1 || !(config.merge_gap >= 0) || !(config.merge_depth >= 0) || !(config.split_depth > 0) ||
-      !(config.split_min_px > 0) || !(config.split_part > 0) || !(config.split_known >= 0) || !(config.min_area_ppm >= 0) || !(config.most_scatter > 0) ||
-      !(config.match_noise_px > 0)) {
+      !(config.split_min_px > 0) || !(config.split_part > 0) || !(config.split_known >= 0) ||
+      !(config.min_area_ppm >= 0) || !(config.most_scatter > 0) || !(config.match_noise_px > 0)) {
     return fail(Fault::kBadConfig);
   }
   const Result<ConvexHull> hull = ConvexHull::create({}, width, height, arena);
@@ -319,7 +319,8 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
   for (std::size_t k = 0; k < in.predictions.size(); ++k) {
     const Prediction& target = in.predictions[k];
     if (!target.confirmed) continue;
-    const int slack = static_cast<int>(std::min(target.image_sd, 0.25 * std::max(target.box.width, target.box.height)) + 1.5);
+    const int slack =
+        static_cast<int>(std::min(target.image_sd, 0.25 * std::max(target.box.width, target.box.height)) + 1.5);
     const Rect reach{target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack,
                      target.box.height + 2 * slack};
     const double inside =
@@ -492,7 +493,8 @@ std::span<const Detection> Detector::conclude(const Input& in) noexcept {
       reject(Rejection::kNoTexture);
       continue;
     }
-    if (candidate.has_depth && candidate.scatter > std::max(config_.most_scatter * candidate.disparity, 1.5) && !known) {
+    if (candidate.has_depth && candidate.scatter > std::max(config_.most_scatter * candidate.disparity, 1.5) &&
+        !known) {
       reject(Rejection::kInconsistent);
       continue;
     }

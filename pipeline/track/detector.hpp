@@ -26,8 +26,8 @@ enum class Rejection : std::uint8_t {
 };
 inline constexpr std::size_t kRejections = 6;
 [[nodiscard]] constexpr const char* to_string(Rejection why) noexcept {
-  constexpr std::array<const char*, kRejections> kNames{"small", "no_texture", "inconsistent_depth", "shadow",
-                                                        "own_surface", "no_room"};
+  constexpr std::array<const char*, kRejections> kNames{"small",  "no_texture",  "inconsistent_depth",
+                                                        "shadow", "own_surface", "no_room"};
   return kNames[static_cast<std::size_t>(why)];
 }
 using RejectionCounts = std::array<std::uint32_t, kRejections>;
@@ -39,10 +39,10 @@ using RejectionCounts = std::array<std::uint32_t, kRejections>;
 ///     cost = ((x - x_t) / w_t)^2 + ((y - y_t) / h_t)^2 + ((d - d_t) / s_t)^2,
 /// else a blob whose disparities form layers with a gap of split_depth between them is split into the layers.
 /// Merge: pieces that are close in the picture (merge_gap; twice that, of the whole target's size, for pieces that one
-/// confirmed target explains) and in depth (merge_depth), and not claimed by different targets, are one object. So are two confirmed targets
-/// one above the other, at one depth and of one motion: an object that had come apart.
-/// Depth of a piece: median of its disparities; its scatter is the median absolute deviation; its position the
-/// mean of its pixels' points (pixels without disparity take the median).
+/// confirmed target explains) and in depth (merge_depth), and not claimed by different targets, are one object. So are
+/// two confirmed targets one above the other, at one depth and of one motion: an object that had come apart. Depth of a
+/// piece: median of its disparities; its scatter is the median absolute deviation; its position the mean of its pixels'
+/// points (pixels without disparity take the median).
 ///
 /// Raw left picture throughout; `disparity` is given there too. One instance a thread.
 /// O(pixels of the blobs x claims).
@@ -52,21 +52,21 @@ class Detector {
   static constexpr int kMaxDetections = 64;
 
   struct Config {
-    int min_area_px = 24;         ///< 1..1e6
-    double min_area_ppm = 100;    ///< and this part of the picture, 0..1e5 [1e-6]: blur grows with the resolution
-    double merge_gap = 0.15;      ///< gap between boxes, as a fraction of the larger one's longer side, 0..2
-    double merge_depth = 0.10;    ///< difference of disparity, as a fraction of the larger, 0..1
-    double split_depth = 0.20;    ///< gap between layers, as a fraction of the disparity, 0.01..1
-    double split_min_px = 2.0;    ///< and at least this much [px], 0.5..50
-    double split_known = 0.5;     ///< part of a blob whose disparity must be known to split it by depth, 0..1
-    double split_part = 0.12;     ///< a layer is at least this part of its blob, 0.01..0.5
-    double most_scatter = 0.15;   ///< median absolute deviation of an object's disparities, as a fraction, 0.01..1
-    double match_noise_px = 0.25; ///< standard deviation of a disparity [px], 0.02..5
+    int min_area_px = 24;          ///< 1..1e6
+    double min_area_ppm = 100;     ///< and this part of the picture, 0..1e5 [1e-6]: blur grows with the resolution
+    double merge_gap = 0.15;       ///< gap between boxes, as a fraction of the larger one's longer side, 0..2
+    double merge_depth = 0.10;     ///< difference of disparity, as a fraction of the larger, 0..1
+    double split_depth = 0.20;     ///< gap between layers, as a fraction of the disparity, 0.01..1
+    double split_min_px = 2.0;     ///< and at least this much [px], 0.5..50
+    double split_known = 0.5;      ///< part of a blob whose disparity must be known to split it by depth, 0..1
+    double split_part = 0.12;      ///< a layer is at least this part of its blob, 0.01..0.5
+    double most_scatter = 0.15;    ///< median absolute deviation of an object's disparities, as a fraction, 0.01..1
+    double match_noise_px = 0.25;  ///< standard deviation of a disparity [px], 0.02..5
   };
 
   struct Input {
     std::span<const Blob> blobs;
-    ImageView<std::uint16_t> labels;  ///< of the blobs; receives label i + 1 for detection i, 0 elsewhere
+    ImageView<std::uint16_t> labels;           ///< of the blobs; receives label i + 1 for detection i, 0 elsewhere
     ImageView<const std::uint16_t> disparity;  ///< 1/16 px in the raw left picture, empty for mono
     ImageView<const std::uint8_t> y;
     ImageView<const std::uint8_t> cb;  ///< empty for grey

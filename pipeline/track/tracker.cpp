@@ -257,7 +257,8 @@ void Tracker::miss(Target& target) noexcept {
   const Vector2 centre = target.image.position();
   const Rect moved{static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
                    static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
-                   std::max(static_cast<int>(target.width + 0.5), 1), std::max(static_cast<int>(target.height + 0.5), 1)};
+                   std::max(static_cast<int>(target.width + 0.5), 1),
+                   std::max(static_cast<int>(target.height + 0.5), 1)};
   target.box = intersect(moved, {0, 0, view_.width, view_.height});
   target.hull.clear();
 }

@@ -30,9 +30,9 @@ namespace stereotrack {
 ///
 /// Life: a detection without a target starts a tentative one. It is confirmed by confirm_hits detections if it
 /// has got somewhere meanwhile: at least travel_px in the picture and straight_part of the path it took (flicker
-/// jumps to and fro), or a twentieth of its distance. tentative_misses frames in a row without detection remove it. A confirmed target
-/// without detection coasts on its prediction for coast_s, but no longer than 0.2 s and half the time for which it
-/// was seen, or until it left the picture.
+/// jumps to and fro), or a twentieth of its distance. tentative_misses frames in a row without detection remove it. A
+/// confirmed target without detection coasts on its prediction for coast_s, but no longer than 0.2 s and half the time
+/// for which it was seen, or until it left the picture.
 ///
 /// Twins: an object that came into view in pieces has a target for each. Two that share one region for kTwinFrames, at
 /// one depth and of one motion, are one object: the smaller goes.
@@ -44,16 +44,16 @@ class Tracker {
   static constexpr int kMaxDetections = 64;
 
   struct Config {
-    int confirm_hits = 3;              ///< detections that confirm a target, 1..20
-    int tentative_misses = 2;          ///< frames without detection that remove a tentative target, 1..10
-    double coast_s = 1.5;              ///< how long a confirmed target lives without detections [s], 0..60
-    double gate = 4.0;                 ///< association gate [standard deviations], 1..10
-    double acceleration = 1.5;         ///< process noise as a fraction of the distance [1/s^2], 0.001..100
-    double initial_speed = 2.0;        ///< uncertainty of a new target's speed as a fraction of its distance [1/s]
-    double centre_noise_px = 0.7;      ///< noise of a box centre [px], 0.05..20
-    double centre_noise_size = 0.05;   ///< and what it grows by with the box's size [1], 0..1
-    double travel_px = 3.0;            ///< way in the picture that tells a target from flicker [px], 0..100
-    double straight_part = 0.4;        ///< part of its path that this way must be, 0..1
+    int confirm_hits = 3;             ///< detections that confirm a target, 1..20
+    int tentative_misses = 2;         ///< frames without detection that remove a tentative target, 1..10
+    double coast_s = 1.5;             ///< how long a confirmed target lives without detections [s], 0..60
+    double gate = 4.0;                ///< association gate [standard deviations], 1..10
+    double acceleration = 1.5;        ///< process noise as a fraction of the distance [1/s^2], 0.001..100
+    double initial_speed = 2.0;       ///< uncertainty of a new target's speed as a fraction of its distance [1/s]
+    double centre_noise_px = 0.7;     ///< noise of a box centre [px], 0.05..20
+    double centre_noise_size = 0.05;  ///< and what it grows by with the box's size [1], 0..1
+    double travel_px = 3.0;           ///< way in the picture that tells a target from flicker [px], 0..100
+    double straight_part = 0.4;       ///< part of its path that this way must be, 0..1
   };
 
   /// What the tracker must know of the camera. focal in px; focal_baseline = f b, 0 for mono.
@@ -93,13 +93,13 @@ class Tracker {
     std::uint64_t apart;  // see Prediction
     bool whole;           // measured in this frame, as a region of its own
     int twin_frames;      // for how long it has shared one region with a larger target of its own depth and motion
-    int whole_hits;  // detections that were regions of their own
+    int whole_hits;       // detections that were regions of their own
     int misses_in_a_row;
     int frames;
     double age_s;
     double unseen_s;
-    double way_px;      // net, from where it began
-    double path_px;     // along the way
+    double way_px;   // net, from where it began
+    double path_px;  // along the way
     double first_distance;
     double last_x;
     double last_y;

@@ -38,9 +38,11 @@ std::string file_refused(const std::string& path) {
 
 /// A folder that goes away with the test.
 class LoadFile : public testing::Test {
+ public:
+  ~LoadFile() override { std::filesystem::remove_all(folder_); }
+
  protected:
   LoadFile() { std::filesystem::create_directories(folder_); }
-  ~LoadFile() override { std::filesystem::remove_all(folder_); }
   [[nodiscard]] std::string write(const std::string& name, const std::string& text) const {
     const std::string path = folder_ / name;
     std::ofstream(path, std::ios::binary) << text;
