@@ -253,7 +253,7 @@ TEST(Interrupt, AtOnceAfterOpeningTheFilesLeavesNoneEither) {
   ProgramOptions options;
   options.signal = SIGTERM;
   options.signal_when = [&] { return fs::exists(out / "telemetry.bin.part"); };
-  // In real time the small scene takes 0.4 s, so the signal comes in the middle.
+  // At two pairs a second the small scene takes 6 s, so the signal comes in the middle.
   const ProgramResult stopped = stereotrack_command(
       {"replay", (folder / "scene").string(), "--out", out.string(), "--pace", "real", "--set", "source.fps=2"},
       options);

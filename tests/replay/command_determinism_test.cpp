@@ -99,11 +99,11 @@ TEST_P(Determinism, ShorterRunGivesTheRowsOfTheWholeOneUpToItsEnd) {
 TEST_P(Determinism, PicturesAreTheSame) {
   for (const char* name : {"first", "second"}) {
     std::vector<std::string> arguments = preset_;
-    arguments.insert(arguments.end(), {"--frames", "30:44", "--render", (folder_ / name).string()});
+    arguments.insert(arguments.end(), {"--frames", "60:84", "--render", (folder_ / name).string()});
     replay(sequence_.string(), folder_ / "out", arguments);
   }
   const std::vector<std::string> names = names_in(folder_ / "first");
-  ASSERT_EQ(names.size(), 15U);
+  ASSERT_EQ(names.size(), 25U);
   EXPECT_GT(fs::file_size(folder_ / "out/tracks.csv"), 0U) << "nothing to draw";
   EXPECT_EQ(names, names_in(folder_ / "second"));
   std::set<std::string> different;
@@ -122,13 +122,11 @@ class SyntheticDeterminism : public testing::TestWithParam<const char*> {};
 
 TEST_P(SyntheticDeterminism, SameSceneTwiceGivesTheSameBytes) {
   const TempDir folder;
-  const std::vector<std::string> arguments{"--set",
-                                           std::string("preset=") + GetParam(),
-                                           "synthetic.frames=60",
-                                           "--set",
-                                           "synthetic.width=320",
-                                           "--set",
-                                           "synthetic.height=240"};
+  std::vector<std::string> arguments;
+  for (const std::string& entry : {std::string("preset=") + GetParam(), std::string("synthetic.frames=60"),
+                                   std::string("synthetic.width=320"), std::string("synthetic.height=240")}) {
+    arguments.insert(arguments.end(), {"--set", entry});
+  }
   replay("synthetic:eleven", folder / "first", arguments);
   replay("synthetic:eleven", folder / "second", arguments);
   expect_same_results(folder / "first", folder / "second");
