@@ -62,10 +62,8 @@ END
 measure_people() {
   local source=$data/stereo_people_overhead
   replay "$work/people" "sbs:$source/my_video_sbs_640x240.avi" --calibration "$source/calibration_as_stored.yml"
-  cat <<END
-| overhead people | measured | target |
-|---|---|---|
-$(awk -F, '
+  printf '| overhead people | measured | target |\n|---|---|---|\n'
+  awk -F, '
     function pass(f) {
       return f >= 57 && f <= 81 ? 1 : f >= 102 && f <= 120 ? 2 : f >= 138 && f <= 174 ? 3 : f >= 207 && f <= 237 ? 4 : 0
     }
@@ -80,21 +78,20 @@ $(awk -F, '
       }
       for (p = 1; p <= 4; p++)
         printf "| tracks in pass %s (rows of the longest) | %d (%d) | 1 |\n", name[p], tracks[p], longest[p]
-      printf "| tracks outside of the passes | %d | only the feet in the corner |\n", tracks[0]
-    }' "$work/people/tracks.csv")
-
-END
+      printf "| tracks outside of the passes or across several | %d | only the feet in the corner |\n\n", tracks[0]
+    }' "$work/people/tracks.csv"
 }
 
 # The ball flies towards the rig at about 10 inches a frame: of the tracks that move faster than 5, the longest.
 ball_of() {
   local tracks=$1 frames=$2 id path speed rows best=0 ball=
-  for id in $(cut -d, -f2 "$tracks" | sort -nu); do
-    path=$("$build/tests/score_path" --tracks "$tracks" --frames "$frames" --id "$id" --model ballistic 2>/dev/null) || continue
+  while read -r id; do
+    path=$("$build/tests/score_path" --tracks "$tracks" --frames "$frames" --id "$id" --model ballistic 2>/dev/null) ||
+      continue
     speed=$(value speed_a_frame <<<"$path")
     rows=$(value rows <<<"$path")
     if awk -v s="$speed" 'BEGIN {exit !(s > 5)}' && ((rows > best)); then best=$rows ball=$id; fi
-  done
+  done < <(cut -d, -f2 "$tracks" | sort -nu)
   [[ -n $ball ]] || die "$tracks: no track flies"
   printf '%s\n' "$ball"
 }
@@ -126,7 +123,7 @@ END
 measure_eleven() {
   local seed folder
   cat <<END
-| seed | HOTA | IDF1 (0.90) | MOTA | IDSW | 3-D error median | 95 % |
+| seed | HOTA | IDF1 (0.90) | MOTA | IDSW | 3-D error median, m | 95 %, m |
 |---|---|---|---|---|---|---|
 END
   for seed in ${SEEDS:-1 2 3}; do
@@ -134,43 +131,44 @@ END
     quiet "$stereotrack" synth eleven --seed "$seed" --out "$folder"
     replay "$folder/out" "$folder"
     "$stereotrack" eval --truth "$folder/gt.csv" --tracks "$folder/out/tracks.csv" --json >"$folder/eval.json"
-    python3 - "$seed" "$folder/eval.json" <<'END'
-import json, sys
-s = json.load(open(sys.argv[2]))
-print("| %s | %.3f | %.3f | %.3f | %d | %.4f | %.4f |" % (sys.argv[1], s["HOTA"], s["IDF1"], s["MOTA"], s["IDSW"],
-      s["error_3d"]["median"], s["error_3d"]["p95"]))
-END
+    awk -F'[:,]' -v seed="$seed" '
+      {gsub(/[" ]/, "", $1); got[$1] = $2}
+      END {
+        printf "| %s | %.3f | %.3f | %.3f | %d | %.3f | %.3f |\n", seed, got["hota"], got["idf1"], got["mota"],
+          got["identity_switches"], got["position_median"], got["position_p95"]
+      }' "$folder/eval.json"
     rm -rf "$folder"
   done
   echo
 }
 
 measure_middlebury() {
-  local preset pair range left right score
-  local -a truth
+  local preset pair range left right truth scale option other score
   cat <<END
 | preset | pair | disparity.max | density % | bad-1 % (valid) | bad-2 % (valid) | bad-2 % (all) |
 |---|---|---|---|---|---|---|
 END
   for preset in robust thesis; do
-    while read -r pair range left right truth[0] truth[1] truth[2] truth[3] truth[4]; do
-      truth[3]=${truth[3]/#@/$data/middlebury_stereo/$pair/}
+    while read -r pair range left right truth scale option other; do
       quiet "$stereotrack" disparity "$data/middlebury_stereo/$pair/$left" "$data/middlebury_stereo/$pair/$right" \
         --config "$root/config/presets/$preset.toml" --set "disparity.max=$range" --out "$work/disparity.png"
-      score=$("$build/tests/score_disparity" --truth "$data/middlebury_stereo/$pair/${truth[0]}" --scale "${truth[1]}" \
-        "${truth[2]}" "${truth[3]}" --disparity "$work/disparity.png")
+      score=$("$build/tests/score_disparity" --truth "$data/middlebury_stereo/$pair/$truth" --scale "$scale" \
+        "$option" "$data/middlebury_stereo/$pair/$other" --disparity "$work/disparity.png")
       printf '| %s | %s | %s | %s | %s | %s | %s |\n' "$preset" "$pair" "$range" "$(percent density <<<"$score")" \
         "$(percent bad_1 <<<"$score")" "$(percent bad_2 <<<"$score")" "$(percent bad_2_of_all <<<"$score")"
     done <<END | tee "$work/rows"
-Cones 64 im2.png im6.png disp2.png 4 --truth-right @disp6.png
-Teddy 64 im2.png im6.png disp2.png 4 --truth-right @disp6.png
-Dolls 96 view1.png view5.png disp1.png 3 --truth-right @disp5.png
-Cloth3 96 view1.png view5.png disp1.png 2 --truth-right @disp5.png
-Adirondack 96 Adirondack_left.png Adirondack_right.png Adirondack_gt.png 1 --mask @Adirondack_mask.png
+Cones 64 im2.png im6.png disp2.png 4 --truth-right disp6.png
+Teddy 64 im2.png im6.png disp2.png 4 --truth-right disp6.png
+Dolls 96 view1.png view5.png disp1.png 3 --truth-right disp5.png
+Cloth3 96 view1.png view5.png disp1.png 2 --truth-right disp5.png
+Adirondack 96 Adirondack_left.png Adirondack_right.png Adirondack_gt.png 1 --mask Adirondack_mask.png
 END
     awk -F'|' -v preset="$preset" '
       {for (i = 5; i <= 8; i++) sum[i] += $i}
-      END {printf "| %s | **mean** | | %.1f | %.1f | %.1f | %.1f |\n", preset, sum[5] / NR, sum[6] / NR, sum[7] / NR, sum[8] / NR}
+      END {
+        printf "| %s | **mean** | | %.1f | %.1f | %.1f | %.1f |\n", preset, sum[5] / NR, sum[6] / NR, sum[7] / NR,
+          sum[8] / NR
+      }
     ' "$work/rows"
   done
   echo
