@@ -14,11 +14,11 @@ namespace stereotrack {
 /// Per pixel: mean m of luma (and of Cb, Cr), mean absolute deviation a of each, number of frames n in which
 /// the pixel looked so, and one candidate: another look, seen lately, with its own count. On a pixel that
 /// is not foreground
-///     m <- m + (x - m) / r,   a <- a + (|x - m| - a) / r,   r = min(n + 1, window)
+///     m <- m + (x - m) / r,   a <- a + (|x - m| - a) / (r + 8),   r = min(n + 1, window)
 /// so the first frames give the plain mean (3.7) and later ones an exponential window. On a foreground pixel
-/// the candidate learns instead. When the candidate has been seen more often than the background (counts
-/// saturate at absorb_frames), they change places: what was there at start and left, dissolves quickly; what
-/// stops in view, is absorbed after absorb_frames.
+/// the candidate learns instead. When the candidate has been seen more often than the background, and at least
+/// 9 times (counts saturate at absorb_frames), they change places: what was there at start and left, dissolves
+/// quickly; what stops in view, is absorbed after absorb_frames.
 ///
 /// Distance of a picture from the background, in standard deviations, 4 steps each:
 ///     z = 4 max(0, |x - g m| - e R) / (1.25 a + floor)
