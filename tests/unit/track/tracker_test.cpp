@@ -216,16 +216,16 @@ TEST_F(TrackerOf, DetectionAtAnotherDepthIsAnotherTarget) {
 }
 
 TEST_F(TrackerOf, OcclusionShorterThanCoastKeepsTheIdentity) {
-  const auto place = [](int k) { return seen_at(60 + 6 * k, 150, 20); };
-  for (int k = 0; k < 20; ++k) step({place(k)});
-  for (int k = 20; k < 44; ++k) {  // 0.96 s
+  const auto place = [](int k) { return seen_at(60 + 3 * k, 150, 20); };
+  for (int k = 0; k < 60; ++k) step({place(k)});
+  for (int k = 60; k < 84; ++k) {  // 0.96 s
     step({});
     ASSERT_EQ(reports().size(), 1U) << k;
     EXPECT_EQ(reports()[0].state, TrackState::kCoasting);
     EXPECT_FALSE(reports()[0].measured);
-    EXPECT_NEAR(reports()[0].image_x, 60 + 6 * k, 8) << "coasts along its path";
+    EXPECT_NEAR(reports()[0].image_x, 60 + 3 * k, 8) << "coasts along its path";
   }
-  step({place(44)});
+  step({place(84)});
   ASSERT_EQ(reports().size(), 1U);
   EXPECT_EQ(reports()[0].id, 1U);
   EXPECT_EQ(reports()[0].state, TrackState::kConfirmed);
@@ -250,7 +250,8 @@ TEST_F(TrackerOf, CoastingTargetThatLeavesThePictureEnds) {
 TEST_F(TrackerOf, CoastIsTimeNotFrames) {
   for (double dt : {0.01, 0.2}) {
     make(config());
-    for (int k = 0; k < 20; ++k) step({seen_at(60 + 4 * k, 150)}, dt);
+    const int frames = static_cast<int>(2 / dt) + 10;  // long enough to be trusted for all of coast_s
+    for (int k = 0; k < frames; ++k) step({seen_at(60 + 200.0 * k / frames, 150)}, dt);
     double unseen = 0;
     while (!reports().empty() && unseen < 5) {
       step({}, dt);
@@ -258,6 +259,17 @@ TEST_F(TrackerOf, CoastIsTimeNotFrames) {
     }
     EXPECT_NEAR(unseen, 1, 1.01 * dt) << dt;
   }
+}
+
+TEST_F(TrackerOf, BrieflySeenTargetCoastsBriefly) {
+  constexpr double kStep = 0.04;
+  for (int k = 0; k < 10; ++k) step({seen_at(60 + 6 * k, 150)}, kStep);
+  double unseen = 0;
+  while (!reports().empty() && unseen < 5) {
+    step({}, kStep);
+    unseen += kStep;
+  }
+  EXPECT_NEAR(unseen, 0.2 + 0.5 * 10 * kStep, 1.01 * kStep);
 }
 
 TEST_F(TrackerOf, CrossingTargetsOfDifferentDepthKeepTheirIdentities) {
