@@ -6,6 +6,7 @@
 
 #include "pipeline/core/bounded_vector.hpp"
 #include "pipeline/core/rect.hpp"
+#include "pipeline/track/appearance.hpp"
 
 namespace stereotrack {
 
@@ -17,9 +18,11 @@ struct Detection {
   bool has_depth = false;                              ///< the fields up to position_covariance are known
   double disparity = 0;                                ///< median over its mask [px]
   double disparity_sd = 0;                             ///< standard deviation of that median [px]
+  double disparity_reach = 0;                          ///< nine tenths of its pixels are this near the median [px]
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
   std::array<std::uint8_t, 3> colour{};  ///< mean Y, Cb, Cr over its mask; Cb = Cr = 128 for grey sources
+  Appearance appearance;
   bool whole = true;                     ///< not cut out of a larger region
   double strength = 0;                   ///< 0..1, how far above the foreground threshold it stands
 
@@ -41,7 +44,9 @@ struct Prediction {
   bool has_depth = false;
   double disparity = 0;     ///< [px]
   double disparity_sd = 0;  ///< from the state's covariance [px]
+  double disparity_reach = 0;  ///< how far its surface usually reaches from there [px]
   std::array<std::uint8_t, 3> colour{};
+  const Appearance* appearance = nullptr;  ///< null: unknown; valid until the next update()
 
   [[nodiscard]] static std::uint64_t bit(std::uint32_t id) noexcept { return std::uint64_t{1} << (id % 64); }
   [[nodiscard]] bool seen_beside(const Prediction& other) const noexcept { return (apart & bit(other.id)) != 0; }

@@ -19,10 +19,15 @@ constexpr double kClaimPart = 0.25;
 // Targets of which the smaller lies inside the larger by this much are taken for one object.
 constexpr double kNestedPart = 0.6;
 constexpr double kOwnGap = 2;
+// The right camera does not see what lies further left than its disparity: what is matched there is wrong.
+constexpr double kBlindMargin = 4;  // [px]
 // Part of its usual area that a target must get of a shared region.
 constexpr double kSplinterPart = 0.2;
 // A depth that does not fit counts against a pixel at most this much.
 constexpr double kMostDepthCost = 16.0;
+// A colour that the target does not have counts this much, one that it has in this part of its pixels half.
+constexpr double kMostColourCost = 4.0;
+constexpr double kRareColour = 0.02;
 // A region's disparity is never known better than this, whatever the number of pixels: errors of neighbours go
 // together, and calibration adds its own.
 constexpr double kLeastDisparitySd = 0.10;
@@ -41,13 +46,16 @@ int gap(const Rect& a, const Rect& b) noexcept {
 
 Result<Detector> Detector::create(const Config& config, int width, int height, Arena& arena) noexcept {
   if (config.min_area_px < 1 || !(config.merge_gap >= 0) || !(config.merge_depth >= 0) || !(config.split_depth > 0) ||
-      !(config.split_min_px > 0) || !(config.split_part > 0) || !(config.split_known >= 0) ||
+      !(config.split_min_px > 0) || !(config.split_part > 0) || !(config.split_jump > 0) ||
       !(config.min_area_ppm >= 0) || !(config.most_scatter > 0) || !(config.match_noise_px > 0)) {
     return fail(Fault::kBadConfig);
   }
   const Result<ConvexHull> hull = ConvexHull::create({}, width, height, arena);
   if (!hull) return fail(hull.error());
-  Detector self(*hull);
+  const Result<DepthSegments> segments = DepthSegments::create(
+      {.jump = config.split_jump, .min_px = config.min_area_px, .min_part = config.split_part}, width, height, arena);
+  if (!segments) return fail(segments.error());
+  Detector self(*hull, *segments);
   self.config_ = config;
   self.width_ = width;
   self.height_ = height;
@@ -92,6 +100,7 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
     layer.has_depth = target.has_depth;
     layer.disparity = target.disparity;
     layer.disparity_sd = target.disparity_sd + config_.match_noise_px + 0.25 * config_.split_depth * target.disparity;
+    layer.appearance = target.appearance;
     layer.claim = static_cast<int>(k);
     layer.fit = overlap(expected, blob.box);
     // Two targets at one place and depth that were never seen side by side are one object followed twice: the one
@@ -114,49 +123,6 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
     }
     if (!rival) (void)layers_.push(layer);
   }
-}
-
-void Detector::layers_from_depth(const Input& in, const Blob& blob) noexcept {
-  if (in.disparity.empty()) return;
-  std::fill(histogram_.begin(), histogram_.end(), 0U);
-  std::uint32_t total = 0;
-  for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
-    const std::uint16_t d = in.disparity.at(x, y);
-    if (d == kNoDisparity) return;
-    ++histogram_[d / kBin];
-    ++total;
-  });
-  if (total < static_cast<std::uint32_t>(2 * min_area_) || total < config_.split_known * blob.area) return;
-  const auto least = static_cast<std::uint32_t>(std::max(config_.split_part * total, 1.0 * min_area_));
-  // A layer ends where the next split_depth of disparity holds next to nothing.
-  std::uint32_t in_layer = 0;
-  double weighted = 0;
-  std::size_t last = 0;
-  const auto close = [&] {
-    if (in_layer >= least && layers_.size() < layers_.capacity()) {
-      Layer layer{};
-      layer.disparity = weighted / in_layer;
-      layer.disparity_sd = std::max(config_.split_min_px, config_.split_depth * layer.disparity) * 0.5;
-      layer.has_depth = true;
-      layer.claim = -1;
-      (void)layers_.push(layer);
-    }
-    in_layer = 0;
-    weighted = 0;
-  };
-  const std::uint32_t noise = std::max<std::uint32_t>(total / 200, 1);
-  for (std::size_t bin = 0; bin < kBins; ++bin) {
-    if (histogram_[bin] <= noise) continue;
-    const double here = (static_cast<double>(bin) + 0.5) * kBin / kDisparityScale;
-    if (in_layer > 0) {
-      const double apart = (static_cast<double>(bin - last)) * kBin / kDisparityScale;
-      if (apart >= std::max(config_.split_min_px, config_.split_depth * here)) close();
-    }
-    in_layer += histogram_[bin];
-    weighted += here * histogram_[bin];
-    last = bin;
-  }
-  close();
 }
 
 // A target that would get but a splinter of the region is not there: it is hidden, or gone.
@@ -195,6 +161,11 @@ std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
       const double apart = raw / static_cast<double>(kDisparityScale) - layer.disparity;
       cost += std::min(square(apart / layer.disparity_sd), kMostDepthCost);
     }
+    if (layer.appearance != nullptr) {
+      const double share = layer.appearance->share(in.y.at(x, y), in.cb.empty() ? 128 : in.cb.at(x, y),
+                                                   in.cr.empty() ? 128 : in.cr.at(x, y));
+      cost += kMostColourCost * kRareColour / (share + kRareColour);
+    }
     if (cost < least) {
       least = cost;
       best = k;
@@ -203,9 +174,11 @@ std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
   return best;
 }
 
-void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, bool whole) noexcept {
+void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob,
+                             bool whole) noexcept {
   Candidate candidate{};
   candidate.label = label;
+  candidate.blob = blob;
   candidate.box = box;
   candidate.claim = claim;
   candidate.whole = whole;
@@ -214,51 +187,43 @@ void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, bo
 }
 
 void Detector::split(const Input& in, const Blob& blob) noexcept {
-  layers_.clear();
-  layers_from_claims(in, blob);
-  if (layers_.size() >= 2) drop_weak_claims(in, blob);
-  const bool claimed = layers_.size() >= 2;
-  if (!claimed) {
-    layers_.clear();
-    layers_from_depth(in, blob);
+  if (blob.area == 0) return;
+  const int segments = in.disparity.empty() ? 1 : segments_.run({in.labels, in.disparity, in.y}, blob);
+  if (segments == 1) {
+    split_by_claims(in, blob, blob.label);
+    return;
   }
+  const std::uint16_t first = next_label_;
+  next_label_ = static_cast<std::uint16_t>(next_label_ + segments);
+  const ImageView<const std::uint16_t> segment = segments_.segment();
+  for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
+    in.labels.at(x, y) = static_cast<std::uint16_t>(first + segment.at(x, y));
+  });
+  for (int k = 0; k < segments; ++k) {
+    const Blob part = measure_region(in.labels, blob.box, static_cast<std::uint16_t>(first + k));
+    if (part.area > 0) split_by_claims(in, part, blob.label);
+  }
+}
+
+// Two targets at one depth: each pixel goes to the one that explains it best.
+void Detector::split_by_claims(const Input& in, const Blob& segment, std::uint16_t blob) noexcept {
+  layers_.clear();
+  layers_from_claims(in, segment);
+  if (layers_.size() >= 2) drop_weak_claims(in, segment);
   if (layers_.size() < 2) {
-    const std::uint16_t label = next_label_++;
-    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) { choice_.at(x, y) = label; });
-    add_candidate(label, blob.box, -1, true);
+    add_candidate(segment.label, segment.box, -1, blob, segment.label == blob);
     return;
   }
   const std::uint16_t first = next_label_;
   next_label_ = static_cast<std::uint16_t>(next_label_ + layers_.size());
-  // Layers without a place get one from the pixels whose disparity tells, for those that have none.
-  if (!claimed) {
-    std::array<double, 8> n{};
-    std::array<double, 8> sx{};
-    std::array<double, 8> sy{};
-    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
-      if (in.disparity.at(x, y) == kNoDisparity) return;
-      const std::size_t k = choose(in, x, y);
-      n[k] += 1;
-      sx[k] += x;
-      sy[k] += y;
-    });
-    for (std::size_t k = 0; k < layers_.size(); ++k) {
-      layers_[k].x = n[k] > 0 ? sx[k] / n[k] : blob.center_x;
-      layers_[k].y = n[k] > 0 ? sy[k] / n[k] : blob.center_y;
-      // Wide, so that depth decides wherever it is known.
-      layers_[k].half_width = blob.box.width;
-      layers_[k].half_height = blob.box.height;
-      layers_[k].has_place = true;
-    }
-  }
-  for_each_pixel(in.labels, blob.box, blob.label,
+  for_each_pixel(in.labels, segment.box, segment.label,
                  [&](int x, int y) { choice_.at(x, y) = static_cast<std::uint16_t>(first + choose(in, x, y)); });
   // A pixel that stands alone among pixels of other layers follows them: 5x5 majority, written behind the reader.
-  for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
+  for_each_pixel(in.labels, segment.box, segment.label, [&](int x, int y) {
     std::array<int, 8> votes{};
     for (int v = std::max(y - 2, 0); v <= std::min(y + 2, height_ - 1); ++v) {
       for (int u = std::max(x - 2, 0); u <= std::min(x + 2, width_ - 1); ++u) {
-        if (in.labels.at(u, v) == blob.label) ++votes[static_cast<std::size_t>(choice_.at(u, v) - first)];
+        if (in.labels.at(u, v) == segment.label) ++votes[static_cast<std::size_t>(choice_.at(u, v) - first)];
       }
     }
     const auto own = static_cast<std::size_t>(choice_.at(x, y) - first);
@@ -268,8 +233,9 @@ void Detector::split(const Input& in, const Blob& blob) noexcept {
     }
     choice_.at(x, y) = static_cast<std::uint16_t>(first + most);
   });
+  for_each_pixel(in.labels, segment.box, segment.label, [&](int x, int y) { in.labels.at(x, y) = choice_.at(x, y); });
   for (std::size_t k = 0; k < layers_.size(); ++k) {
-    add_candidate(static_cast<std::uint16_t>(first + k), blob.box, layers_[k].claim, false);
+    add_candidate(static_cast<std::uint16_t>(first + k), segment.box, layers_[k].claim, blob, false);
   }
 }
 
@@ -278,6 +244,10 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
   candidate.area = blob.area;
   if (blob.area == 0) return;
   candidate.box = blob.box;
+  candidate.appearance.clear();
+  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
+    candidate.appearance.add(in.y.at(x, y), in.cb.empty() ? 128 : in.cb.at(x, y), in.cr.empty() ? 128 : in.cr.at(x, y));
+  });
   candidate.valid = 0;
   candidate.has_depth = false;
   if (in.disparity.empty()) return;
@@ -306,16 +276,32 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
     if (bin + reach < kBins) inside += histogram_[bin + reach];
   }
   candidate.scatter = (static_cast<double>(reach) + 0.25) * kBin / kDisparityScale;
+  const auto most = static_cast<std::uint32_t>(candidate.valid * 9LL / 10);
+  const std::size_t middle = reach;
+  while (inside < most) {
+    ++reach;
+    if (bin >= reach) inside += histogram_[bin - reach];
+    if (bin + reach < kBins) inside += histogram_[bin + reach];
+  }
+  candidate.reach = (static_cast<double>(reach) + 0.25) * kBin / kDisparityScale;
+  reach = middle;
   // A block's disparities hang together: about one independent value every 5 x 5 pixels.
   const double independent = std::max(candidate.valid / 25.0, 1.0);
   candidate.disparity_sd = std::sqrt(square(kLeastDisparitySd) + square(1.5 * candidate.scatter) / independent);
   candidate.has_depth = true;
 }
 
+bool Detector::depth_fits(const Prediction& target, double disparity, double disparity_sd) const noexcept {
+  if (!target.has_depth) return true;
+  const double nearer = std::max(target.disparity, disparity);
+  const double slack = std::clamp(target.disparity_reach, config_.merge_depth * nearer, config_.split_depth * nearer);
+  return std::abs(target.disparity - disparity) <=
+         3 * (target.disparity_sd + std::min(disparity_sd, 2.0)) + slack + 0.5;
+}
+
 int Detector::claim_of(const Input& in, const Candidate& candidate) const noexcept {
-  if (candidate.claim >= 0) return candidate.claim;
   int best = -1;
-  double most = 0.5;
+  double most = 0;
   for (std::size_t k = 0; k < in.predictions.size(); ++k) {
     const Prediction& target = in.predictions[k];
     if (!target.confirmed) continue;
@@ -325,36 +311,37 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
                      target.box.height + 2 * slack};
     const double inside =
         static_cast<double>(intersect(reach, candidate.box).area()) / static_cast<double>(candidate.box.area());
-    if (inside <= most) continue;
-    if (target.has_depth && candidate.has_depth) {
-      const double apart = std::abs(target.disparity - candidate.disparity);
-      const double allowed = 3 * (target.disparity_sd + candidate.disparity_sd) +
-                             2 * config_.merge_depth * std::max(target.disparity, candidate.disparity) + 1;
-      if (apart > allowed) continue;
+    if (inside <= 0.5) continue;
+    const bool blind = candidate.box.right() < target.disparity + kBlindMargin;
+    if (candidate.has_depth && !blind && !depth_fits(target, candidate.disparity, candidate.disparity_sd)) continue;
+    double fit = inside;
+    if (target.appearance != nullptr) {
+      fit += target.appearance->explains(candidate.appearance, candidate.area / std::max(target.area, 1.0));
     }
-    most = inside;
+    if (fit <= most) continue;
+    most = fit;
     best = static_cast<int>(k);
   }
   return best;
 }
 
 bool Detector::belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept {
-  const int claim_a = claim_of(in, a);
-  const int claim_b = claim_of(in, b);
-  if (a.has_depth && b.has_depth) {
+  const bool same = a.claim >= 0 && a.claim == b.claim;
+  if (!same && a.has_depth && b.has_depth) {
     const double nearer = std::max(a.disparity, b.disparity);
     const double apart = std::abs(a.disparity - b.disparity);
-    if (apart > std::max(config_.merge_depth * nearer, 1.0) + 2 * std::min(a.disparity_sd + b.disparity_sd, 2.0)) {
-      return false;
-    }
+    const bool cut = a.blob == b.blob && a.claim < 0 && b.claim < 0;
+    const double limit = cut ? std::max(config_.split_depth * nearer, config_.split_min_px)
+                             : std::max(config_.merge_depth * nearer, 1.0);
+    if (apart > limit + 2 * std::min(a.disparity_sd + b.disparity_sd, 2.0)) return false;
   }
   const int across = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
   const bool stacked = across * 2 >= std::min(a.box.width, b.box.width);
-  const bool same = claim_a >= 0 && claim_a == claim_b;
-  if (!same && claim_a >= 0 && claim_b >= 0) {
+  if (!same && a.claim >= 0 && b.claim >= 0) {
     if (!stacked) return false;
-    const Prediction& first = in.predictions[static_cast<std::size_t>(claim_a)];
-    const Prediction& second = in.predictions[static_cast<std::size_t>(claim_b)];
+    const Prediction& first = in.predictions[static_cast<std::size_t>(a.claim)];
+    const Prediction& second = in.predictions[static_cast<std::size_t>(b.claim)];
+    if (first.seen_beside(second)) return false;
     const double speed = std::max(length(first.vx, first.vy), length(second.vx, second.vy));
     const double size = std::max({a.box.width, a.box.height, b.box.width, b.box.height});
     if (length(first.vx - second.vx, first.vy - second.vy) > 0.4 * speed + 0.2 * size) return false;
@@ -363,7 +350,7 @@ bool Detector::belong_together(const Input& in, const Candidate& a, const Candid
   // A target that is known to be one object may have come apart further than strangers may be.
   double reach = std::max(larger.width, larger.height);
   if (same) {
-    const Rect& whole = in.predictions[static_cast<std::size_t>(claim_a)].box;
+    const Rect& whole = in.predictions[static_cast<std::size_t>(a.claim)].box;
     reach = kOwnGap * std::max({larger.width, larger.height, whole.width, whole.height});
   }
   return gap(a.box, b.box) <= config_.merge_gap * reach;
@@ -405,22 +392,22 @@ std::span<Detector::Candidate> Detector::segment(const Input& in) noexcept {
   rejections_ = {};
   candidates_.clear();
   next_label_ = 1;
+  for (const Blob& blob : in.blobs) next_label_ = std::max(next_label_, static_cast<std::uint16_t>(blob.label + 1));
   for (const Blob& blob : in.blobs) split(in, blob);
-  // The labels of the pieces replace those of the blobs.
-  for (int y = 0; y < height_; ++y) {
-    std::uint16_t* label = in.labels.row(y);
-    for (int x = 0; x < width_; ++x) {
-      if (label[x] != 0) label[x] = choice_.at(x, y);
+  const auto claim = [&] {
+    for (Candidate& candidate : candidates_) {
+      if (candidate.area > 0 && candidate.claim < 0) candidate.claim = claim_of(in, candidate);
     }
-  }
+  };
   for (Candidate& candidate : candidates_) measure(in, candidate);
+  claim();
   merge(in);
+  claim();
   std::size_t kept = 0;
   for (const Candidate& candidate : candidates_) {
     if (candidate.area > 0) candidates_[kept++] = candidate;
   }
   candidates_.truncate(kept);
-  for (Candidate& candidate : candidates_) candidate.claim = claim_of(in, candidate);
   return {candidates_.begin(), candidates_.size()};
 }
 
@@ -429,6 +416,7 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   out.box = candidate.box;
   out.area = candidate.area;
   out.whole = candidate.whole;
+  out.appearance = candidate.appearance;
   std::array<std::uint64_t, 3> colour{};
   std::uint64_t strength = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -464,6 +452,7 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
     // The mean of points at many disparities lies at its own disparity, f b / Z.
     out.disparity = g.f * g.baseline / out.position.z();
     out.disparity_sd = candidate.disparity_sd;
+    out.disparity_reach = candidate.reach;
     const double sigma_px = 0.5 + 0.03 * std::sqrt(static_cast<double>(candidate.area));
     const std::optional<Estimate3> point =
         triangulate(g, {u_sum / placed, v_sum / placed, out.disparity}, {sigma_px, sigma_px, out.disparity_sd});

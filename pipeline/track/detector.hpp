@@ -11,6 +11,7 @@
 #include "pipeline/geometry/rectify.hpp"
 #include "pipeline/shape/blob_extractor.hpp"
 #include "pipeline/shape/convex_hull.hpp"
+#include "pipeline/track/depth_segments.hpp"
 #include "pipeline/track/detection.hpp"
 
 namespace stereotrack {
@@ -58,8 +59,8 @@ class Detector {
     double merge_depth = 0.10;     ///< difference of disparity, as a fraction of the larger, 0..1
     double split_depth = 0.20;     ///< gap between layers, as a fraction of the disparity, 0.01..1
     double split_min_px = 2.0;     ///< and at least this much [px], 0.5..50
-    double split_known = 0.5;      ///< part of a blob whose disparity must be known to split it by depth, 0..1
-    double split_part = 0.12;      ///< a layer is at least this part of its blob, 0.01..0.5
+    double split_jump = 0.05;      ///< step between neighbours that is an edge in depth, as a fraction, 0.005..1
+    double split_part = 0.04;      ///< a layer is at least this part of its blob, 1/32..0.5
     double most_scatter = 0.15;    ///< median absolute deviation of an object's disparities, as a fraction, 0.01..1
     double match_noise_px = 0.25;  ///< standard deviation of a disparity [px], 0.02..5
   };
@@ -79,6 +80,7 @@ class Detector {
   /// An object in the making: what is left of the blobs after splitting and merging.
   struct Candidate {
     std::uint16_t label;  ///< of its pixels in Input::labels
+    std::uint16_t blob;   ///< label of the blob it was cut from
     Rect box;             ///< [px]
     int area;             ///< [px]
     bool whole;           ///< not cut out of a larger blob
@@ -89,6 +91,8 @@ class Detector {
     double disparity_sd;  ///< [px]
     bool own_surface;     ///< set by the caller: known to be part of the background's surface
     double scatter;       ///< median absolute deviation [px]
+    double reach;         ///< nine tenths of its pixels are this near the median [px]
+    Appearance appearance;
     std::uint16_t root;   ///< used while merging
   };
 
@@ -109,20 +113,22 @@ class Detector {
   struct Layer {
     double x, y, half_width, half_height;
     double disparity, disparity_sd;
+    const Appearance* appearance;
     double fit;
     bool has_place, has_depth;
     int claim;
   };
 
-  explicit Detector(const ConvexHull& hull) noexcept : hull_(hull) {}
+  Detector(const ConvexHull& hull, const DepthSegments& segments) noexcept : hull_(hull), segments_(segments) {}
   void split(const Input& in, const Blob& blob) noexcept;
+  void split_by_claims(const Input& in, const Blob& segment, std::uint16_t blob) noexcept;
   void layers_from_claims(const Input& in, const Blob& blob) noexcept;
   void drop_weak_claims(const Input& in, const Blob& blob) noexcept;
-  void layers_from_depth(const Input& in, const Blob& blob) noexcept;
   [[nodiscard]] std::size_t choose(const Input& in, int x, int y) const noexcept;
-  void add_candidate(std::uint16_t label, const Rect& box, int claim, bool whole) noexcept;
+  void add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob, bool whole) noexcept;
   void measure(const Input& in, Candidate& candidate) noexcept;
   void merge(const Input& in) noexcept;
+  [[nodiscard]] bool depth_fits(const Prediction& target, double disparity, double disparity_sd) const noexcept;
   [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
   [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
@@ -134,6 +140,7 @@ class Detector {
   int min_area_ = 0;
   std::uint16_t next_label_ = 1;
   ConvexHull hull_;
+  DepthSegments segments_;
   RejectionCounts rejections_{};
   BoundedVector<Candidate> candidates_;
   BoundedVector<Detection> detections_;

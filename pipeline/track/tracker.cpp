@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/shape/region.hpp"
+
 namespace stereotrack {
 
 namespace {
@@ -12,17 +14,19 @@ using Vector2 = ConstantVelocityFilter<2>::Vector;
 
 // Size and colour tell targets apart, but may not outweigh where they are: each adds at most this.
 constexpr double kMostSoftCost = 16.0;
-// One standard deviation of the size between two frames, as a ratio of areas, and of the mean colour.
+constexpr double kMostColourCost = 25.0;
+// One standard deviation of the size between two frames, as a ratio of areas.
 constexpr double kAreaRatioSd = 1.5;
-constexpr double kLumaSd = 14.0;
-constexpr double kChromaSd = 6.0;
+// Part of a detection's colours that its target usually does not explain, and one standard deviation of it.
+constexpr double kUsualStrange = 0.2;
+constexpr double kStrangeSd = 0.15;
 // Features that a target needs for their votes to count, and what their vote weighs.
 constexpr std::size_t kVoters = 3;
 constexpr double kFeatureCost = 6.0;
 // How much a new feature's speed may differ from its target's, as a fraction of the distance [1/s].
 constexpr double kFeatureSpeed = 0.1;
 // What is left beyond the gate for looks: above, a target rather stays alone.
-constexpr double kStranger = 9.0;
+constexpr double kStranger = 2.0;
 // A target coasts this long [s], and this part of the time for which it was seen, but never over coast_s.
 constexpr double kCoastAnyway = 0.2;
 constexpr double kCoastPart = 0.5;
@@ -33,11 +37,19 @@ constexpr int kTwinFrames = 10;
 constexpr double kTwinDepth = 0.04;
 constexpr double kTwinSpeed = 0.15;
 constexpr double kTwinSway = 0.2;
+constexpr double kTwinStacked = 0.4;
+constexpr double kTwinBeside = 0.1;
+// Two that were this far from each other, in sizes or in depth, are not pieces of one object.
+constexpr double kApartGap = 0.5;
+constexpr double kApartDepth = 0.2;
 // A target may claim part of a region if it was seen on its own so often, and lately [s].
 constexpr int kIndependentHits = 8;
 constexpr double kClaimsFor = 0.7;
 // Smoothing of size and colour: a partly hidden target must not be learnt at once.
 constexpr double kAppearanceRate = 0.2;
+constexpr double kShrinkRate = 0.05;
+constexpr double kLooksRate = 0.05;
+constexpr double kBlindMargin = 4;  // [px]
 // A target that comes straight on hardly moves in the picture: this change of distance shows it.
 constexpr double kApproachPart = 0.05;
 
@@ -111,14 +123,44 @@ std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uin
       prediction.disparity = view_.focal_baseline / z;
       prediction.disparity_sd = prediction.disparity / z * std::sqrt(target.space.position_covariance()(2, 2));
     }
-    for (std::size_t i = 0; i < 3; ++i) prediction.colour[i] = static_cast<std::uint8_t>(target.colour[i] + 0.5);
+    prediction.appearance = &target.appearance;
+    prediction.disparity_reach = target.disparity_reach;
     (void)predictions_.push(prediction);
   }
   return predictions_.view();
 }
 
+// Where the target's centre is, seen through this detection, along one axis. A detection that ends inside the picture
+// on one side only shows that edge; the other lies outside. Else one that is smaller than the target shows a part of it,
+// and one that is larger has something added to it: the centre is known up to half the difference, and within that it is
+// where it was expected.
+double Tracker::centre_along(double expected, double size, int from, int to, int end) noexcept {
+  const double extent = std::max<double>(size, to - from);
+  const bool cut_before = from <= 0;
+  const bool cut_after = to >= end;
+  if (cut_before != cut_after) return (cut_before ? to - 0.5 * extent : from + 0.5 * extent) - 0.5;
+  const double off = 0.5 * (from + to - 1) - expected;
+  const double slack = 0.5 * std::abs(size - (to - from));
+  return expected + off - std::clamp(off, -slack, slack);
+}
+
+Vector2 Tracker::centre(const Target& target, const Detection& detection) const noexcept {
+  const Vector2 expected = target.image.position();
+  const Rect& box = detection.box;
+  return {centre_along(expected.x(), target.width, box.left, box.right(), view_.width),
+          centre_along(expected.y(), target.height, box.top, box.bottom(), view_.height)};
+}
+
+// What lies at the left border of the left picture further out than its disparity, the right camera does not see:
+// whatever was matched there is wrong.
+bool Tracker::sees_depth(const Target& target, const Detection& detection) const noexcept {
+  if (!detection.has_depth) return false;
+  const double z = target.space.position().z();
+  return !target.has_depth || !(z > 0) || detection.box.right() > view_.focal_baseline / z + kBlindMargin;
+}
+
 double Tracker::cost(const Target& target, const Detection& detection) const noexcept {
-  const Vector2 z(detection.centre_x(), detection.centre_y());
+  const Vector2 z = centre(target, detection);
   const auto innovation = target.image.innovation(z, centre_noise(config_, detection.box));
   // Half the step again as standard deviation along the motion: a frame may be missing without a trace.
   const Vector2 step = target.image.velocity() * (dt_ * 0.5);
@@ -133,18 +175,20 @@ double Tracker::cost(const Target& target, const Detection& detection) const noe
 
   double in_depth = 0;
   const double z_predicted = target.space.position().z();
-  if (target.has_depth && detection.has_depth && z_predicted > 0) {
+  if (target.has_depth && sees_depth(target, detection) && z_predicted > 0) {
     const double expected = view_.focal_baseline / z_predicted;
     const double expected_variance = square(expected / z_predicted) * target.space.position_covariance()(2, 2);
     const double step_d = expected / z_predicted * target.space.velocity().z() * dt_ * 0.5;
     in_depth = square(detection.disparity - expected) /
-               (expected_variance + square(detection.disparity_sd) + square(step_d) + 0.25);
+               (expected_variance + square(detection.disparity_sd) + square(step_d) +
+                square(0.5 * detection.disparity_reach) + 0.25);
     if (!(in_depth <= limit)) return Assignment::kForbidden;
   }
   const double ratio = detection.area > target.area ? detection.area / target.area : target.area / detection.area;
   const double in_size = std::min(square((ratio - 1) / kAreaRatioSd), kMostSoftCost);
-  double in_colour = square((detection.colour[0] - target.colour[0]) / kLumaSd);
-  for (std::size_t i = 1; i < 3; ++i) in_colour += square((detection.colour[i] - target.colour[i]) / kChromaSd);
+  const double part = detection.area / std::max(target.area, 1.0);
+  const double strange = std::max(1 - target.appearance.explains(detection.appearance, part) - kUsualStrange, 0.0);
+  const double in_colour = std::min(square(strange / kStrangeSd), kMostColourCost);
   double in_features = 0;
   if (target.features.size() >= kVoters) {
     int inside = 0;
@@ -157,7 +201,7 @@ double Tracker::cost(const Target& target, const Detection& detection) const noe
     }
     in_features = kFeatureCost * (1 - inside / static_cast<double>(target.features.size()));
   }
-  return in_picture + in_depth + in_size + in_features + std::min(in_colour, kMostSoftCost);
+  return in_picture + in_depth + in_size + in_features + in_colour;
 }
 
 void Tracker::associate(std::span<const Detection> detections, bool confirmed) noexcept {
@@ -194,9 +238,9 @@ void Tracker::associate(std::span<const Detection> detections, bool confirmed) n
 
 void Tracker::measure(Target& target, const Detection& detection, std::uint16_t label) noexcept {
   target.label = label;
-  const Vector2 z(detection.centre_x(), detection.centre_y());
+  const Vector2 z = centre(target, detection);
   (void)target.image.update(z, centre_noise(config_, detection.box));
-  if (detection.has_depth) {
+  if (sees_depth(target, detection)) {
     if (target.has_depth) {
       (void)target.space.update(detection.position, detection.position_covariance);
     } else {
@@ -212,10 +256,17 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   target.whole = detection.whole;
   if (detection.whole) ++target.whole_hits;
   const double rate = target.hits < 5 ? 1.0 / target.hits : kAppearanceRate;
-  target.width += (detection.box.width - target.width) * rate;
-  target.height += (detection.box.height - target.height) * rate;
-  target.area += (detection.area - target.area) * rate;
-  for (std::size_t i = 0; i < 3; ++i) target.colour[i] += (detection.colour[i] - target.colour[i]) * rate;
+  const double shrink = target.hits < 5 ? rate : kShrinkRate;
+  target.width += (detection.box.width - target.width) * (detection.box.width > target.width ? rate : shrink);
+  target.height += (detection.box.height - target.height) * (detection.box.height > target.height ? rate : shrink);
+  target.area += (detection.area - target.area) * (detection.area > target.area ? rate : shrink);
+  target.disparity_reach += (detection.disparity_reach - target.disparity_reach) * rate;
+  const bool cut = sides_touched(detection.box, view_.width, view_.height) != 0;
+  if (target.hits < 5) {
+    target.appearance.learn(detection.appearance, rate);
+  } else if (detection.whole && !cut) {
+    target.appearance.learn(detection.appearance, kLooksRate);
+  }
   target.quality += (0.5 + 0.5 * detection.strength - target.quality) * 0.2;
   target.path_px += std::sqrt(square(z.x() - target.last_x) + square(z.y() - target.last_y));
   target.way_px = std::sqrt(square(z.x() - target.first_x) + square(z.y() - target.first_y));
@@ -277,7 +328,8 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   target.last_y = target.first_y;
   target.first_distance = detection.has_depth ? detection.position.z() : 0;
   target.quality = 0.25 + 0.25 * detection.strength;
-  for (std::size_t i = 0; i < 3; ++i) target.colour[i] = detection.colour[i];
+  target.appearance.learn(detection.appearance, 1);
+  target.disparity_reach = detection.disparity_reach;
   target.box = detection.box;
   target.hull = detection.hull;
   target.hits = 1;
@@ -300,15 +352,19 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
 }
 
 bool Tracker::are_twins(const Target& a, const Target& b) const noexcept {
-  const Rect grown{a.box.left - 2, a.box.top - 2, a.box.width + 4, a.box.height + 4};
-  if (intersect(grown, b.box).empty()) return false;
+  const double size = std::max({a.width, a.height, b.width, b.height});
+  const int across = std::max(a.box.left, b.box.left) - std::min(a.box.right(), b.box.right());
+  const int down = std::max(a.box.top, b.box.top) - std::min(a.box.bottom(), b.box.bottom());
+  const bool shared = !a.whole && !b.whole;
+  const bool stacked = -across * 2 >= std::min(a.box.width, b.box.width);
+  const double room = shared ? 2 : stacked ? kTwinStacked * size : kTwinBeside * size;
+  if (std::max(across, down) > room) return false;
   if (a.has_depth && b.has_depth) {
     const double za = a.space.position().z();
     const double zb = b.space.position().z();
     if (std::abs(za - zb) > kTwinDepth * std::min(za, zb)) return false;
   }
   const double speed = std::sqrt(std::max(a.image.velocity().squaredNorm(), b.image.velocity().squaredNorm()));
-  const double size = std::max({a.width, a.height, b.width, b.height});
   const double apart = std::sqrt((a.image.velocity() - b.image.velocity()).squaredNorm());
   return apart <= kTwinSpeed * speed + kTwinSway * size;
 }
@@ -316,10 +372,10 @@ bool Tracker::are_twins(const Target& a, const Target& b) const noexcept {
 void Tracker::drop_twins() noexcept {
   for (Target& target : targets_) {
     bool twin = false;
-    for (std::size_t j = 0; j < targets_.size() && target.measured && !target.whole; ++j) {
+    for (std::size_t j = 0; j < targets_.size() && target.measured; ++j) {
       const Target& other = targets_[j];
       const bool greater = other.area > target.area || (other.area == target.area && other.id < target.id);
-      twin = twin || (greater && other.measured && !other.whole && are_twins(other, target));
+      twin = twin || (greater && other.measured && are_twins(other, target));
     }
     if (target.measured) target.twin_frames = std::max(target.twin_frames + (twin ? 1 : -1), 0);
   }
@@ -364,10 +420,29 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
   }
   drop_twins();
   for (Target& target : targets_) renew_features(target, luma, labels);
-  std::uint64_t whole = 0;
-  for (const Target& target : targets_) whole |= target.whole ? Prediction::bit(target.id) : 0;
-  for (Target& target : targets_) target.apart |= target.whole ? whole : 0;
+  note_apart();
   report();
+}
+
+// Pieces of one object lie close together and at one depth.
+void Tracker::note_apart() noexcept {
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    for (std::size_t j = 0; j < targets_.size(); ++j) {
+      Target& a = targets_[i];
+      const Target& b = targets_[j];
+      if (i == j || !a.whole || !b.whole) continue;
+      const double size = std::max({a.width, a.height, b.width, b.height});
+      const double across = std::max({a.box.left - b.box.right(), b.box.left - a.box.right(), 0});
+      const double down = std::max({a.box.top - b.box.bottom(), b.box.top - a.box.bottom(), 0});
+      bool apart = std::max(across, down) > kApartGap * size;
+      if (a.has_depth && b.has_depth) {
+        const double za = a.space.position().z();
+        const double zb = b.space.position().z();
+        apart = apart || std::abs(za - zb) > kApartDepth * std::min(za, zb);
+      }
+      if (apart) a.apart |= Prediction::bit(b.id);
+    }
+  }
 }
 
 void Tracker::report() noexcept {

@@ -109,7 +109,8 @@ class Tracker {
     double quality;
     double first_x;
     double first_y;
-    std::array<double, 3> colour;
+    Appearance appearance;
+    double disparity_reach;
     ConstantVelocityFilter<2> image;
     ConstantVelocityFilter<3> space;
     Rect box;
@@ -118,6 +119,9 @@ class Tracker {
     Features::Set features;
   };
 
+  [[nodiscard]] static double centre_along(double expected, double size, int from, int to, int end) noexcept;
+  [[nodiscard]] bool sees_depth(const Target& target, const Detection& detection) const noexcept;
+  [[nodiscard]] Eigen::Vector2d centre(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double cost(const Target& target, const Detection& detection) const noexcept;
   void associate(std::span<const Detection> detections, bool confirmed) noexcept;
   void measure(Target& target, const Detection& detection, std::uint16_t label) noexcept;
@@ -127,6 +131,7 @@ class Tracker {
   void start(const Detection& detection, std::uint16_t label) noexcept;
   [[nodiscard]] bool are_twins(const Target& a, const Target& b) const noexcept;
   void drop_twins() noexcept;
+  void note_apart() noexcept;
   template <class Fn>
   void keep_targets(Fn&& wanted) noexcept {
     std::size_t kept = 0;
