@@ -87,6 +87,7 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   planes(self.left_, setup.colour);
   self.scratch_ = arena.image<std::uint8_t>(setup.width, setup.height);
   self.typical_distance_ = arena.array<std::uint8_t>(static_cast<std::size_t>(config.shape.max_blobs) + 1);
+  self.ghost_ = arena.array<std::uint8_t>(static_cast<std::size_t>(config.shape.max_blobs) + 1);
   self.moving_ = arena.image<std::uint8_t>(setup.width, setup.height);
   self.equalise_left_ = Equalise({config.equalise});
   self.equalise_right_ = Equalise({config.equalise});
@@ -481,6 +482,7 @@ ShadowTest::Input Pipeline::shadow_input() const noexcept {
           .distance = left_.distance,
           .labels = blobs_.labels,
           .typical = typical_distance_,
+          .ghost = ghost_,
           .disparity = disparity_,
           .disparity_background = old_disparity_};
 }
@@ -496,6 +498,10 @@ void Pipeline::measure_strength() noexcept {
       --level;
     }
     typical_distance_[blob.label] = static_cast<std::uint8_t>(level);
+    ShadowTest::Evidence sum;
+    for_each_pixel(blobs_.labels, blob.box, blob.label,
+                   [&](int x, int y) { shadow_test_->weigh(shadow_input(), x, y, sum); });
+    ghost_[blob.label] = sum.behind > sum.near ? 1 : 0;
   }
 }
 

@@ -133,6 +133,7 @@ class Pipeline {
   std::span<const Prediction> predictions_;
   BlobSet blobs_;
   std::span<std::uint8_t> typical_distance_;  ///< by label: 75th percentile of the distance
+  std::span<std::uint8_t> ghost_;  // by label
   RejectionCounts rejections_{};
 
   Planes left_;

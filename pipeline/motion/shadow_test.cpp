@@ -85,7 +85,9 @@ void ShadowTest::weigh(const Input& in, int x, int y, Evidence& sum) const noexc
 ShadowTest::Verdict ShadowTest::judge(const Input& in, int x, int y) const noexcept {
   switch (depth_of(in, x, y)) {
     case Depth::kNear: return kObject;
-    case Depth::kBehind: return kBackground;
+    case Depth::kBehind:
+      if (in.ghost[in.labels.at(x, y)] != 0) return kBackground;
+      break;
     case Depth::kOwn: return looks_like_background(in, x, y, kOwnSlack) ? kBackground : kObject;
     case Depth::kUnknown: break;
   }

@@ -13,8 +13,9 @@ namespace stereotrack {
 ///
 /// Stereo evidence first, where the present disparity d and the background's own d_b are both known:
 ///     d - d_b > disparity_px       nearer than the background: object, whatever it looks like
-///     d_b - d > disparity_px       behind it, where nothing can be: the background holds something that has
-///                                  left, a ghost
+///     d_b - d > disparity_px       behind it, where nothing can be: in a region that is mostly so, the background
+///                                  holds something that has left, a ghost; in another, one of the two is wrong and
+///                                  stereo says nothing
 ///     else                         the background's own surface: shadow if it looks so, the tolerances below
 ///                                  taken three times as wide
 /// Photometric evidence, where stereo says nothing or "own surface". With r the ratio of the lights over 5x5,
@@ -58,6 +59,7 @@ class ShadowTest {
     ImageView<const std::uint8_t> distance;               ///< to the background, any unit
     ImageView<const std::uint16_t> labels;                ///< region of each pixel, 0 = none
     std::span<const std::uint8_t> typical;                ///< 75th percentile of distance by label
+    std::span<const std::uint8_t> ghost;                  ///< by label: 1 where the region is mostly behind
     ImageView<const std::uint16_t> disparity;             ///< 1/16 px, kNoDisparity where unknown
     ImageView<const std::uint16_t> disparity_background;  ///< the same of the background
   };

@@ -19,6 +19,8 @@ constexpr double kClaimPart = 0.25;
 // Targets of which the smaller lies inside the larger by this much are taken for one object.
 constexpr double kNestedPart = 0.6;
 constexpr double kOwnGap = 2;
+// Part of a piece's colours that a target must explain to be taken for another part of it.
+constexpr double kAlike = 0.6;
 // The right camera does not see what lies further left than its disparity: what is matched there is wrong.
 constexpr double kBlindMargin = 4;  // [px]
 // Part of its usual area that a target must get of a shared region.
@@ -291,12 +293,16 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
   candidate.has_depth = true;
 }
 
-bool Detector::depth_fits(const Prediction& target, double disparity, double disparity_sd) const noexcept {
+// A surface that reaches far in depth may be seen at another place of it, if it looks like the target.
+bool Detector::depth_fits(const Prediction& target, double disparity, double disparity_sd,
+                          double likeness) const noexcept {
   if (!target.has_depth) return true;
   const double nearer = std::max(target.disparity, disparity);
-  const double slack = std::clamp(target.disparity_reach, config_.merge_depth * nearer, config_.split_depth * nearer);
+  const double most = config_.split_depth * nearer;
+  const double usual = config_.merge_depth * nearer;
+  const double slack = likeness >= kAlike ? std::clamp(target.disparity_reach, usual, most) : usual;
   return std::abs(target.disparity - disparity) <=
-         3 * (target.disparity_sd + std::min(disparity_sd, 2.0)) + slack + 0.5;
+         2 * (target.disparity_sd + std::min(disparity_sd, 2.0)) + slack + 0.5;
 }
 
 int Detector::claim_of(const Input& in, const Candidate& candidate) const noexcept {
@@ -312,12 +318,16 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
     const double inside =
         static_cast<double>(intersect(reach, candidate.box).area()) / static_cast<double>(candidate.box.area());
     if (inside <= 0.5) continue;
+    const double likeness =
+        target.appearance == nullptr
+            ? 1.0
+            : target.appearance->explains(candidate.appearance, candidate.area / std::max(target.area, 1.0));
     const bool blind = candidate.box.right() < target.disparity + kBlindMargin;
-    if (candidate.has_depth && !blind && !depth_fits(target, candidate.disparity, candidate.disparity_sd)) continue;
-    double fit = inside;
-    if (target.appearance != nullptr) {
-      fit += target.appearance->explains(candidate.appearance, candidate.area / std::max(target.area, 1.0));
+    if (candidate.has_depth && !blind &&
+        !depth_fits(target, candidate.disparity, candidate.disparity_sd, likeness)) {
+      continue;
     }
+    const double fit = inside + likeness;
     if (fit <= most) continue;
     most = fit;
     best = static_cast<int>(k);
@@ -327,13 +337,14 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
 
 bool Detector::belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept {
   const bool same = a.claim >= 0 && a.claim == b.claim;
-  if (!same && a.has_depth && b.has_depth) {
+  if (a.has_depth && b.has_depth) {
     const double nearer = std::max(a.disparity, b.disparity);
     const double apart = std::abs(a.disparity - b.disparity);
     const bool cut = a.blob == b.blob && a.claim < 0 && b.claim < 0;
-    const double limit = cut ? std::max(config_.split_depth * nearer, config_.split_min_px)
-                             : std::max(config_.merge_depth * nearer, 1.0);
-    if (apart > limit + 2 * std::min(a.disparity_sd + b.disparity_sd, 2.0)) return false;
+    double limit = cut ? std::max(config_.split_depth * nearer, config_.split_min_px)
+                       : std::max(config_.merge_depth * nearer, 1.0);
+    if (same) limit = std::max(limit, in.predictions[static_cast<std::size_t>(a.claim)].disparity_reach);
+    if (apart > limit + 2 * std::min(length(a.disparity_sd, b.disparity_sd), 2.0)) return false;
   }
   const int across = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
   const bool stacked = across * 2 >= std::min(a.box.width, b.box.width);

@@ -56,7 +56,7 @@ class Detector {
     int min_area_px = 24;          ///< 1..1e6
     double min_area_ppm = 100;     ///< and this part of the picture, 0..1e5 [1e-6]: blur grows with the resolution
     double merge_gap = 0.15;       ///< gap between boxes, as a fraction of the larger one's longer side, 0..2
-    double merge_depth = 0.10;     ///< difference of disparity, as a fraction of the larger, 0..1
+    double merge_depth = 0.08;     ///< difference of disparity, as a fraction of the larger, 0..1
     double split_depth = 0.20;     ///< gap between layers, as a fraction of the disparity, 0.01..1
     double split_min_px = 2.0;     ///< and at least this much [px], 0.5..50
     double split_jump = 0.05;      ///< step between neighbours that is an edge in depth, as a fraction, 0.005..1
@@ -128,7 +128,8 @@ class Detector {
   void add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob, bool whole) noexcept;
   void measure(const Input& in, Candidate& candidate) noexcept;
   void merge(const Input& in) noexcept;
-  [[nodiscard]] bool depth_fits(const Prediction& target, double disparity, double disparity_sd) const noexcept;
+  [[nodiscard]] bool depth_fits(const Prediction& target, double disparity, double disparity_sd,
+                                double likeness) const noexcept;
   [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
   [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;

@@ -260,7 +260,8 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   target.width += (detection.box.width - target.width) * (detection.box.width > target.width ? rate : shrink);
   target.height += (detection.box.height - target.height) * (detection.box.height > target.height ? rate : shrink);
   target.area += (detection.area - target.area) * (detection.area > target.area ? rate : shrink);
-  target.disparity_reach += (detection.disparity_reach - target.disparity_reach) * rate;
+  target.disparity_reach +=
+      (detection.disparity_reach - target.disparity_reach) * (target.hits < 5 ? rate : kLooksRate);
   const bool cut = sides_touched(detection.box, view_.width, view_.height) != 0;
   if (target.hits < 5) {
     target.appearance.learn(detection.appearance, rate);
