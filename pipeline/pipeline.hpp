@@ -10,6 +10,7 @@
 #include "pipeline/core/result.hpp"
 #include "pipeline/frame.hpp"
 #include "pipeline/geometry/rectify.hpp"
+#include "pipeline/motion/depth_completion.hpp"
 #include "pipeline/motion/mean_background.hpp"
 #include "pipeline/pipeline_config.hpp"
 #include "pipeline/shape/contour_fill.hpp"
@@ -115,6 +116,9 @@ class Pipeline {
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;
+  void complete_by_depth() noexcept;
+  [[nodiscard]] double median_disparity(const Blob& blob) noexcept;
+  void take_disparity(const Rect& box, std::uint16_t label) noexcept;
   void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
   void learn_background() noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
@@ -133,7 +137,8 @@ class Pipeline {
   std::span<const Prediction> predictions_;
   BlobSet blobs_;
   std::span<std::uint8_t> typical_distance_;  ///< by label: 75th percentile of the distance
-  std::span<std::uint8_t> ghost_;  // by label
+  std::span<std::uint8_t> ghost_;             ///< by label: 1 where most of it lies behind the background
+  std::span<std::uint16_t> samples_;          ///< a region's disparities, for their median
   RejectionCounts rejections_{};
 
   Planes left_;
@@ -166,6 +171,7 @@ class Pipeline {
   std::optional<ConvexHull> convex_hull_;
   std::optional<LevelSet> level_set_;
   std::optional<ShadowTest> shadow_test_;
+  std::optional<DepthCompletion> depth_completion_;
   std::optional<Rectifier> rectifier_;
   std::optional<SadMatcher> sad_;
   std::optional<CensusMatcher> census_;

@@ -8,6 +8,8 @@ namespace stereotrack {
 
 namespace {
 
+constexpr int kFaintPercent = 50;
+
 constexpr int kStepsPerSd = AdaptiveBackground::kStepsPerSd;
 constexpr int kHaloReach = 2;
 constexpr int kMaxComponents = 4096;
@@ -27,6 +29,7 @@ Result<ForegroundMask> ForegroundMask::create(const Config& config, int width, i
   self.config_ = config;
   self.low_ = static_cast<int>(config.low_sd * kStepsPerSd + 0.5);
   self.high_ = static_cast<int>(config.high_sd * kStepsPerSd + 0.5);
+  self.faint_ = static_cast<int>(config.faint_sd * kStepsPerSd + 0.5);
   self.candidates_ = arena.image<std::uint8_t>(width, height);
   self.row_max_ = arena.image<std::uint8_t>(width, height);
   self.seeds_ = arena.array<std::uint32_t>(kMaxComponents + 1);
@@ -55,7 +58,19 @@ Result<double> ForegroundMask::run(ImageView<const std::uint8_t> distance, Image
         most = std::max<int>(most, row_max_.at(x, v));
       }
       const int here = distance.at(x, y);
-      candidates_.at(x, y) = here >= low_ && here * 100 >= most * config_.halo_percent ? 1 : 0;
+      int sum = 0;
+      int count = 0;
+      if (here < low_) {
+        for (int v = std::max(y - 2, 0); v <= std::min(y + 2, height - 1); ++v) {
+          for (int u = std::max(x - 2, 0); u <= std::min(x + 2, width - 1); ++u) {
+            sum += distance.at(u, v);
+            ++count;
+          }
+        }
+      }
+      const bool strong = here >= low_ && here * 100 >= most * config_.halo_percent;
+      const bool faint = sum >= faint_ * count && count > 0 && sum * 100 >= most * count * kFaintPercent;
+      candidates_.at(x, y) = strong || faint ? 1 : 0;
     }
   }
   for (int y = 0; y < height; ++y) {

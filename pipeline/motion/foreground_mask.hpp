@@ -22,6 +22,7 @@ class ForegroundMask {
  public:
   struct Config {
     double low_sd = 4.0;    ///< candidate [standard deviations], 0.5..30
+    double faint_sd = 1.25;  ///< candidate, as the mean of 5x5 [standard deviations], 0.5..30
     double high_sd = 8.0;   ///< seed [standard deviations], low_sd..60
     int halo_percent = 25;  ///< 0..90; 0 keeps the halo
     int min_seeds = 5;      ///< seeds that a component needs [px], 1..10000
@@ -40,6 +41,7 @@ class ForegroundMask {
 
   int low_ = 0;
   int high_ = 0;
+  int faint_ = 0;
   Config config_;
   ImageView<std::uint8_t> candidates_;
   ImageView<std::uint8_t> row_max_;

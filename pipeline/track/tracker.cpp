@@ -35,8 +35,9 @@ constexpr double kVisiblePart = 0.5;
 // Twins: frames, difference of distance and of speed as fractions, and sway of pieces [sizes/s].
 constexpr int kTwinFrames = 10;
 constexpr double kTwinDepth = 0.04;
-constexpr double kTwinSpeed = 0.15;
-constexpr double kTwinSway = 0.2;
+constexpr double kTwinDrift = 0.25;
+constexpr double kTwinWay = 1.0;
+constexpr int kTwinStill = 30;
 constexpr double kTwinStacked = 0.4;
 constexpr double kTwinBeside = 0.1;
 // Two that were this far from each other, in sizes or in depth, are not pieces of one object.
@@ -352,35 +353,55 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   }
 }
 
-bool Tracker::are_twins(const Target& a, const Target& b) const noexcept {
+bool Tracker::close_together(const Target& a, const Target& b) const noexcept {
   const double size = std::max({a.width, a.height, b.width, b.height});
   const int across = std::max(a.box.left, b.box.left) - std::min(a.box.right(), b.box.right());
   const int down = std::max(a.box.top, b.box.top) - std::min(a.box.bottom(), b.box.bottom());
   const bool shared = !a.whole && !b.whole;
   const bool stacked = -across * 2 >= std::min(a.box.width, b.box.width);
-  const double room = shared ? 2 : stacked ? kTwinStacked * size : kTwinBeside * size;
-  if (std::max(across, down) > room) return false;
-  if (a.has_depth && b.has_depth) {
-    const double za = a.space.position().z();
-    const double zb = b.space.position().z();
-    if (std::abs(za - zb) > kTwinDepth * std::min(za, zb)) return false;
+  if (std::max(across, down) > (shared ? 2.0 : (stacked ? kTwinStacked : kTwinBeside) * size)) return false;
+  if (!a.has_depth || !b.has_depth) return true;
+  const double za = a.space.position().z();
+  const double zb = b.space.position().z();
+  return std::abs(za - zb) <= kTwinDepth * std::min(za, zb);
+}
+
+// How long the target has gone along with a larger one, without a change of their places.
+void Tracker::follow_twin(Target& target) noexcept {
+  if (!target.measured) return;
+  const Target* partner = nullptr;
+  for (const Target& other : targets_) {
+    const bool greater = other.area > target.area || (other.area == target.area && other.id < target.id);
+    if (!greater || !other.measured || !close_together(other, target)) continue;
+    if (partner == nullptr || other.id == target.twin) partner = &other;
   }
-  const double speed = std::sqrt(std::max(a.image.velocity().squaredNorm(), b.image.velocity().squaredNorm()));
-  const double apart = std::sqrt((a.image.velocity() - b.image.velocity()).squaredNorm());
-  return apart <= kTwinSpeed * speed + kTwinSway * size;
+  if (partner == nullptr) {
+    target.twin_frames = std::max(target.twin_frames - 1, 0);
+    if (target.twin_frames == 0) target.twin = 0;
+    return;
+  }
+  const Vector2 own = target.image.position();
+  const Vector2 offset = partner->image.position() - own;
+  const double size = std::max({target.width, target.height, partner->width, partner->height});
+  const double drift = (offset - Vector2(target.twin_dx, target.twin_dy)).norm();
+  if (target.twin != partner->id || drift > kTwinDrift * size) {
+    target.twin = partner->id;
+    target.twin_frames = 0;
+    target.twin_dx = offset.x();
+    target.twin_dy = offset.y();
+    target.twin_from_x = own.x();
+    target.twin_from_y = own.y();
+  }
+  ++target.twin_frames;
 }
 
 void Tracker::drop_twins() noexcept {
-  for (Target& target : targets_) {
-    bool twin = false;
-    for (std::size_t j = 0; j < targets_.size() && target.measured; ++j) {
-      const Target& other = targets_[j];
-      const bool greater = other.area > target.area || (other.area == target.area && other.id < target.id);
-      twin = twin || (greater && other.measured && are_twins(other, target));
-    }
-    if (target.measured) target.twin_frames = std::max(target.twin_frames + (twin ? 1 : -1), 0);
-  }
-  keep_targets([](const Target& target) { return target.twin_frames < kTwinFrames; });
+  for (Target& target : targets_) follow_twin(target);
+  keep_targets([](const Target& target) {
+    const double way = (target.image.position() - Vector2(target.twin_from_x, target.twin_from_y)).norm();
+    const bool together = way >= kTwinWay * std::max(target.width, target.height);
+    return target.twin_frames < (together ? kTwinFrames : kTwinStill);
+  });
 }
 
 bool Tracker::got_somewhere(const Target& target) const noexcept {

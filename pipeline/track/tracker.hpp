@@ -92,7 +92,12 @@ class Tracker {
     int hits;
     std::uint64_t apart;  // see Prediction
     bool whole;           // measured in this frame, as a region of its own
-    int twin_frames;      // for how long it has shared one region with a larger target of its own depth and motion
+    std::uint32_t twin;   // id of the larger target beside it that may be the same object, 0 = none
+    int twin_frames;      // for how long
+    double twin_dx;       // offset of the centres when that began [px]
+    double twin_dy;
+    double twin_from_x;  // and where it was
+    double twin_from_y;
     int whole_hits;       // detections that were regions of their own
     int misses_in_a_row;
     int frames;
@@ -129,7 +134,8 @@ class Tracker {
                       ImageView<const std::uint16_t> labels) noexcept;
   void miss(Target& target) noexcept;
   void start(const Detection& detection, std::uint16_t label) noexcept;
-  [[nodiscard]] bool are_twins(const Target& a, const Target& b) const noexcept;
+  [[nodiscard]] bool close_together(const Target& a, const Target& b) const noexcept;
+  void follow_twin(Target& target) noexcept;
   void drop_twins() noexcept;
   void note_apart() noexcept;
   template <class Fn>

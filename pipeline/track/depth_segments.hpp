@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "pipeline/core/arena.hpp"
+#include "pipeline/core/bounded_vector.hpp"
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/core/result.hpp"
+#include "pipeline/shape/blob_extractor.hpp"
+
+namespace stereotrack {
+
+/// Splits a blob into segments of continuous depth: what touches in the picture but not in space.
+///
+/// 1. Pixels without disparity take that of the known pixel nearest by a path inside the blob, on which each step
+///    costs 1 + |change of luma| / 4: flat surfaces are filled from their textured rims, and not across an edge.
+/// 2. 4-neighbours hang together if their disparities differ by at most max(jump_px, jump d).
+/// 3. A component with fewer than min_part of the blob's pixels (or than min_px) is noise: its pixels go to the nearest
+///    larger one, by the same path.
+/// A blob without any disparity is one segment without depth.
+///
+/// disparity in 1/16 px, kNoDisparity where unknown, same picture as labels. Two sweeps over the blob's box in each
+/// direction (exact for convex blobs, near enough for others). One instance a thread. O(box).
+class DepthSegments {
+ public:
+  static constexpr int kMost = 32;
+
+  struct Config {
+    double jump = 0.05;     ///< of the disparity, 0.005..1
+    double jump_px = 1.0;   ///< 0.1..50 [px]
+    int min_px = 24;        ///< 1..1e6
+    double min_part = 0.03; ///< 1/32..0.5
+  };
+
+  struct Input {
+    ImageView<const std::uint16_t> labels;
+    ImageView<const std::uint16_t> disparity;
+    ImageView<const std::uint8_t> y;
+  };
+
+  /// Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<DepthSegments> create(const Config& config, int width, int height,
+                                                    Arena& arena) noexcept;
+
+  /// Number of segments, 1..kMost. segment() then holds 0..n-1 at the blob's pixels, and anything elsewhere.
+  [[nodiscard]] int run(const Input& in, const Blob& blob) noexcept;
+
+  [[nodiscard]] ImageView<const std::uint16_t> segment() const noexcept { return segment_; }
+  /// Disparity of the blob's pixels, filled; kNoDisparity if the blob has none at all.
+  [[nodiscard]] ImageView<const std::uint16_t> filled() const noexcept { return filled_; }
+
+ private:
+  struct Place {
+    std::uint16_t x, y;
+  };
+
+  void spread(const Input& in, const Blob& blob, ImageView<std::uint16_t> value) noexcept;
+  int flood(const Input& in, const Blob& blob, int least) noexcept;
+
+  Config config_;
+  ImageView<std::uint16_t> filled_;
+  ImageView<std::uint16_t> segment_;
+  ImageView<std::uint16_t> cost_;
+  std::span<Place> queue_;
+};
+
+}  // namespace stereotrack
