@@ -21,6 +21,7 @@ constexpr double kNestedPart = 0.6;
 constexpr double kOwnGap = 2;
 // Part of a piece's colours that a target must explain to be taken for another part of it.
 constexpr double kAlike = 0.6;
+constexpr double kUnlike = 0.5;
 // The right camera does not see what lies further left than its disparity: what is matched there is wrong.
 constexpr double kBlindMargin = 4;  // [px]
 // Part of its usual area that a target must get of a shared region.
@@ -293,16 +294,24 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
   candidate.has_depth = true;
 }
 
-// A surface that reaches far in depth may be seen at another place of it, if it looks like the target.
-bool Detector::depth_fits(const Prediction& target, double disparity, double disparity_sd,
-                          double likeness) const noexcept {
-  if (!target.has_depth) return true;
-  const double nearer = std::max(target.disparity, disparity);
-  const double most = config_.split_depth * nearer;
-  const double usual = config_.merge_depth * nearer;
-  const double slack = likeness >= kAlike ? std::clamp(target.disparity_reach, usual, most) : usual;
-  return std::abs(target.disparity - disparity) <=
-         2 * (target.disparity_sd + std::min(disparity_sd, 2.0)) + slack + 0.5;
+// Depth and looks together: a piece may be somewhat nearer than the target or look somewhat different, not both. One
+// that looks alike may lie as far from the target's middle as its surface is known to reach.
+bool Detector::resembles(const Prediction& target, const Candidate& candidate) const noexcept {
+  const double likeness =
+      target.appearance == nullptr
+          ? 1.0
+          : target.appearance->explains(candidate.appearance, candidate.area / std::max(target.area, 1.0));
+  double apart = 0;
+  const bool blind = candidate.box.right() < target.disparity + kBlindMargin;
+  if (target.has_depth && candidate.has_depth && !blind) {
+    const double nearer = std::max(target.disparity, candidate.disparity);
+    const double usual = config_.merge_depth * nearer;
+    const double slack =
+        likeness >= kAlike ? std::clamp(target.disparity_reach, usual, config_.split_depth * nearer) : usual;
+    const double limit = 2 * (target.disparity_sd + std::min(candidate.disparity_sd, 2.0)) + slack + 0.5;
+    apart = std::abs(target.disparity - candidate.disparity) / limit;
+  }
+  return apart <= 1 && square(apart) + square((1 - likeness) / kUnlike) <= 1.5;
 }
 
 int Detector::claim_of(const Input& in, const Candidate& candidate) const noexcept {
@@ -318,15 +327,8 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
     const double inside =
         static_cast<double>(intersect(reach, candidate.box).area()) / static_cast<double>(candidate.box.area());
     if (inside <= 0.5) continue;
-    const double likeness =
-        target.appearance == nullptr
-            ? 1.0
-            : target.appearance->explains(candidate.appearance, candidate.area / std::max(target.area, 1.0));
-    const bool blind = candidate.box.right() < target.disparity + kBlindMargin;
-    if (candidate.has_depth && !blind &&
-        !depth_fits(target, candidate.disparity, candidate.disparity_sd, likeness)) {
-      continue;
-    }
+    if (!resembles(target, candidate)) continue;
+    const double likeness = target.appearance == nullptr ? 1.0 : target.appearance->explains(candidate.appearance);
     const double fit = inside + likeness;
     if (fit <= most) continue;
     most = fit;

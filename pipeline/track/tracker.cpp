@@ -19,7 +19,7 @@ constexpr double kMostColourCost = 25.0;
 constexpr double kAreaRatioSd = 1.5;
 // Part of a detection's colours that its target usually does not explain, and one standard deviation of it.
 constexpr double kUsualStrange = 0.2;
-constexpr double kStrangeSd = 0.15;
+constexpr double kStrangeSd = 0.12;
 // Features that a target needs for their votes to count, and what their vote weighs.
 constexpr std::size_t kVoters = 3;
 constexpr double kFeatureCost = 6.0;
