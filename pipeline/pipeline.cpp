@@ -25,9 +25,11 @@ constexpr int kVerdictPercent = 70;
 constexpr int kEvidencePercent = 30;
 // The background's disparity is renewed this much slower once it is complete.
 constexpr int kLaterPasses = 10;
-constexpr int kWidestGap = 64;  // [px]
+constexpr int kWidestGap = 64;        // [px]
+constexpr int kWidestColumnGap = 16;  // [px]
 // A region's match counts if the second best place is at least this much worse.
 constexpr double kUnique = 1.5;
+constexpr double kLeastCost = 9;  // of a region's match, by noise alone [grey levels squared]
 // How far around a region its missing parts are looked for, as a part of its longer side.
 constexpr int kCompletionPercent = 40;
 // Room around a predicted disparity, in standard deviations and as a fraction, for targets that accelerate.
@@ -58,6 +60,27 @@ void bridge_gaps(std::uint16_t* row, int width) noexcept {
       }
     }
     last = x;
+  }
+}
+
+// The same along the columns, for rows top..bottom: a line along the rows has no disparity of its own.
+void bridge_columns(ImageView<std::uint16_t> map, int top, int bottom) noexcept {
+  const int first = std::max(top - kWidestColumnGap, 0);
+  for (int x = 0; x < map.width; ++x) {
+    int last = -1;
+    for (int y = first; y < bottom; ++y) {
+      if (map.at(x, y) == kNoDisparity) continue;
+      if (last >= 0 && y - last > 1 && y - last <= kWidestColumnGap) {
+        const int from = map.at(x, last);
+        const int to = map.at(x, y);
+        if (std::abs(to - from) <= std::max(2 * kDisparityScale, from / 10)) {
+          for (int v = last + 1; v < y; ++v) {
+            map.at(x, v) = static_cast<std::uint16_t>(from + (to - from) * (v - last) / (y - last));
+          }
+        }
+      }
+      last = y;
+    }
   }
 }
 
@@ -445,6 +468,7 @@ void Pipeline::renew_background_disparity() noexcept {
   fill(canvas_background_, strip, kNoDisparity);
   run_matcher(left_.background_canvas, right_.background_canvas, strip, {0, full_range_}, canvas_background_);
   for (int y = strip.top; y < strip.bottom(); ++y) bridge_gaps(canvas_background_.row(y), strip.width);
+  bridge_columns(canvas_background_, strip.top, strip.bottom());
   renewed_rows_ += strip.height;
 }
 
@@ -668,8 +692,24 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
       before = whole.disparity_px;
     }
     const double limit = std::max(config_.shadow.own_depth_px, 2.5 * candidate.disparity_sd);
-    candidate.own_surface = before >= 0 && candidate.disparity - before <= limit;
+    candidate.own_surface =
+        before >= 0 && (candidate.disparity - before <= limit || fits_at(before, roi, candidate.area));
   }
+}
+
+// Whether the small region in canvas_labels_ matches about as well at this disparity as anywhere: lines along the rows
+// do, wherever they are.
+bool Pipeline::fits_at(double disparity, const Rect& roi, int area) noexcept {
+  if (area > config_.disparity.small_px) return false;
+  const int middle = static_cast<int>(disparity + 0.5);
+  const DisparityRange near{std::max(middle - 1, 0), std::min(middle + 1, full_range_)};
+  const auto match = [&](DisparityRange range) {
+    return region_matcher_->run<std::uint16_t>(left_.canvas, right_.canvas, canvas_labels_, 1, roi, range, {});
+  };
+  const Result<RegionMatch> here = match(near);
+  const Result<RegionMatch> anywhere = match({0, full_range_});
+  return here.has_value() && anywhere.has_value() && here->found && anywhere->found &&
+         here->cost <= kUnique * std::max(anywhere->cost, kLeastCost);
 }
 
 // Half of the region's pixels look like the background under another light.

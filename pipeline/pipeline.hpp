@@ -120,6 +120,7 @@ class Pipeline {
   [[nodiscard]] double median_disparity(const Blob& blob) noexcept;
   void take_disparity(const Rect& box, std::uint16_t label) noexcept;
   void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
+  [[nodiscard]] bool fits_at(double disparity, const Rect& roi, int area) noexcept;
   void learn_background() noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
   [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;

@@ -37,6 +37,7 @@ constexpr int kTwinFrames = 10;
 constexpr double kTwinDepth = 0.04;
 constexpr double kTwinDrift = 0.25;
 constexpr double kTwinWay = 1.0;
+constexpr double kLimbPart = 0.15;  // so small a part may swing
 constexpr int kTwinStill = 30;
 constexpr double kTwinStacked = 0.4;
 constexpr double kTwinBeside = 0.1;
@@ -269,6 +270,7 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   } else if (detection.whole && !cut) {
     target.appearance.learn(detection.appearance, kLooksRate);
   }
+  target.evidence += detection.strength;
   target.quality += (0.5 + 0.5 * detection.strength - target.quality) * 0.2;
   target.path_px += std::sqrt(square(z.x() - target.last_x) + square(z.y() - target.last_y));
   target.way_px = std::sqrt(square(z.x() - target.first_x) + square(z.y() - target.first_y));
@@ -276,7 +278,8 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   target.last_y = z.y();
   target.box = detection.box;
   target.hull = detection.hull;
-  if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits && got_somewhere(target)) {
+  if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits && target.evidence >= config_.confirm_evidence &&
+      got_somewhere(target)) {
     target.state = TrackState::kConfirmed;
   } else if (target.state == TrackState::kCoasting) {
     target.state = TrackState::kConfirmed;
@@ -329,6 +332,7 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   target.last_x = target.first_x;
   target.last_y = target.first_y;
   target.first_distance = detection.has_depth ? detection.position.z() : 0;
+  target.evidence = detection.strength;
   target.quality = 0.25 + 0.25 * detection.strength;
   target.appearance.learn(detection.appearance, 1);
   target.disparity_reach = detection.disparity_reach;
@@ -384,7 +388,8 @@ void Tracker::follow_twin(Target& target) noexcept {
   const Vector2 offset = partner->image.position() - own;
   const double size = std::max({target.width, target.height, partner->width, partner->height});
   const double drift = (offset - Vector2(target.twin_dx, target.twin_dy)).norm();
-  if (target.twin != partner->id || drift > kTwinDrift * size) {
+  const bool limb = target.area < kLimbPart * partner->area;
+  if (target.twin != partner->id || (drift > kTwinDrift * size && !limb)) {
     target.twin = partner->id;
     target.twin_frames = 0;
     target.twin_dx = offset.x();
