@@ -73,11 +73,13 @@ int DepthSegments::flood(const Input& in, const Blob& blob, int least) noexcept 
   for_each_pixel(in.labels, blob.box, blob.label, [&](int x0, int y0) {
     if (segment_.at(x0, y0) != kUnseen) return;
     std::size_t last = 0;
+    std::size_t known = 0;
     queue_[last++] = {static_cast<std::uint16_t>(x0), static_cast<std::uint16_t>(y0)};
     segment_.at(x0, y0) = static_cast<std::uint16_t>(found);
     for (std::size_t first = 0; first < last; ++first) {
       const Place p = queue_[first];
       const int here = filled_.at(p.x, p.y);
+      known += in.disparity.at(p.x, p.y) != kNoDisparity ? 1U : 0U;
       const int jump = static_cast<int>(std::max(config_.jump_px * kDisparityScale, config_.jump * here));
       constexpr std::array<std::array<int, 2>, 4> kSteps{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
       for (const auto& [dx, dy] : kSteps) {
@@ -89,7 +91,7 @@ int DepthSegments::flood(const Input& in, const Blob& blob, int least) noexcept 
         queue_[last++] = {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
       }
     }
-    if (last >= static_cast<std::size_t>(least) && found < kMost) {
+    if (last >= static_cast<std::size_t>(least) && static_cast<double>(known) >= config_.min_known * static_cast<double>(last) && found < kMost) {
       ++found;
     } else {
       for (std::size_t i = 0; i < last; ++i) segment_.at(queue_[i].x, queue_[i].y) = kLoose;

@@ -16,8 +16,8 @@ namespace stereotrack {
 /// 1. Pixels without disparity take that of the known pixel nearest by a path inside the blob, on which each step
 ///    costs 1 + |change of luma| / 4: flat surfaces are filled from their textured rims, and not across an edge.
 /// 2. 4-neighbours hang together if their disparities differ by at most max(jump_px, jump d).
-/// 3. A component with fewer than min_part of the blob's pixels (or than min_px) is noise: its pixels go to the nearest
-///    larger one, by the same path.
+/// 3. A component with fewer than min_part of the blob's pixels (or than min_px), or of which less than min_known was
+///    measured rather than filled, is no evidence: its pixels go to the nearest other one, by the same path.
 /// A blob without any disparity is one segment without depth.
 ///
 /// disparity in 1/16 px, kNoDisparity where unknown, same picture as labels. Two sweeps over the blob's box in each
@@ -31,6 +31,7 @@ class DepthSegments {
     double jump_px = 1.0;   ///< 0.1..50 [px]
     int min_px = 24;        ///< 1..1e6
     double min_part = 0.03; ///< 1/32..0.5
+    double min_known = 0.2; ///< part of a component's pixels whose own disparity must be known, 0..1
   };
 
   struct Input {
