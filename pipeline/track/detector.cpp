@@ -72,12 +72,16 @@ Result<Detector> Detector::create(const Config& config, int width, int height, A
 }
 
 void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
+  Candidate whole{};
+  whole.label = blob.label;
+  whole.box = blob.box;
+  measure(in, whole);
   for (std::size_t k = 0; k < in.predictions.size() && layers_.size() < layers_.capacity(); ++k) {
     const Prediction& target = in.predictions[k];
     if (!target.confirmed || !target.independent) continue;
     const Rect expected = intersect(target.box, {0, 0, width_, height_});
     const Rect common = intersect(expected, blob.box);
-    if (common.empty()) continue;
+    if (common.empty() || depth_apart(target, whole, 1) > 1) continue;
     int covered = 0;
     int matching = 0;
     int known = 0;
@@ -214,7 +218,7 @@ void Detector::split_by_claims(const Input& in, const Blob& segment, std::uint16
   layers_from_claims(in, segment);
   if (layers_.size() >= 2) drop_weak_claims(in, segment);
   if (layers_.size() < 2) {
-    add_candidate(segment.label, segment.box, -1, blob, segment.label == blob);
+    add_candidate(segment.label, segment.box, -1, blob, true);
     return;
   }
   const std::uint16_t first = next_label_;
@@ -294,23 +298,26 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
   candidate.has_depth = true;
 }
 
-// Depth and looks together: a piece may be somewhat nearer than the target or look somewhat different, not both. One
-// that looks alike may lie as far from the target's middle as its surface is known to reach.
+// Difference in depth, 1 = as much as a piece may be nearer or farther than the target. One that looks alike may lie as
+// far from the target's middle as its surface is known to reach.
+double Detector::depth_apart(const Prediction& target, const Candidate& candidate, double likeness) const noexcept {
+  const bool blind = candidate.box.right() < target.disparity + kBlindMargin;
+  if (!target.has_depth || !candidate.has_depth || blind) return 0;
+  const double nearer = std::max(target.disparity, candidate.disparity);
+  const double usual = config_.merge_depth * nearer;
+  const double slack =
+      likeness >= kAlike ? std::clamp(target.disparity_reach, usual, config_.split_depth * nearer) : usual;
+  const double limit = 2 * (target.disparity_sd + std::min(candidate.disparity_sd, 2.0)) + slack + 0.5;
+  return std::abs(target.disparity - candidate.disparity) / limit;
+}
+
+// Depth and looks together: a piece may be somewhat nearer than the target or look somewhat different, not both.
 bool Detector::resembles(const Prediction& target, const Candidate& candidate) const noexcept {
   const double likeness =
       target.appearance == nullptr
           ? 1.0
           : target.appearance->explains(candidate.appearance, candidate.area / std::max(target.area, 1.0));
-  double apart = 0;
-  const bool blind = candidate.box.right() < target.disparity + kBlindMargin;
-  if (target.has_depth && candidate.has_depth && !blind) {
-    const double nearer = std::max(target.disparity, candidate.disparity);
-    const double usual = config_.merge_depth * nearer;
-    const double slack =
-        likeness >= kAlike ? std::clamp(target.disparity_reach, usual, config_.split_depth * nearer) : usual;
-    const double limit = 2 * (target.disparity_sd + std::min(candidate.disparity_sd, 2.0)) + slack + 0.5;
-    apart = std::abs(target.disparity - candidate.disparity) / limit;
-  }
+  const double apart = depth_apart(target, candidate, likeness);
   return apart <= 1 && square(apart) + square((1 - likeness) / kUnlike) <= 1.5;
 }
 

@@ -128,6 +128,8 @@ class Detector {
   void add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob, bool whole) noexcept;
   void measure(const Input& in, Candidate& candidate) noexcept;
   void merge(const Input& in) noexcept;
+  [[nodiscard]] double depth_apart(const Prediction& target, const Candidate& candidate,
+                                   double likeness) const noexcept;
   [[nodiscard]] bool resembles(const Prediction& target, const Candidate& candidate) const noexcept;
   [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
   [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept;

@@ -51,6 +51,7 @@ constexpr double kClaimsFor = 0.7;
 constexpr double kAppearanceRate = 0.2;
 constexpr double kShrinkRate = 0.05;
 constexpr double kLooksRate = 0.05;
+constexpr double kMostLooksRate = 0.3;
 constexpr double kBlindMargin = 4;  // [px]
 // A target that comes straight on hardly moves in the picture: this change of distance shows it.
 constexpr double kApproachPart = 0.05;
@@ -261,14 +262,17 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   const double shrink = target.hits < 5 ? rate : kShrinkRate;
   target.width += (detection.box.width - target.width) * (detection.box.width > target.width ? rate : shrink);
   target.height += (detection.box.height - target.height) * (detection.box.height > target.height ? rate : shrink);
+  const double known_area = target.area;
   target.area += (detection.area - target.area) * (detection.area > target.area ? rate : shrink);
   target.disparity_reach +=
       (detection.disparity_reach - target.disparity_reach) * (target.hits < 5 ? rate : kLooksRate);
+  // What comes into view is learnt as it comes; what leaves is not forgotten.
   const bool cut = sides_touched(detection.box, view_.width, view_.height) != 0;
+  const double grown = (detection.area - known_area) / std::max(detection.area, 1);
   if (target.hits < 5) {
     target.appearance.learn(detection.appearance, rate);
-  } else if (detection.whole && !cut) {
-    target.appearance.learn(detection.appearance, kLooksRate);
+  } else if (detection.whole && (!cut || grown > kLooksRate)) {
+    target.appearance.learn(detection.appearance, std::clamp(grown, kLooksRate, kMostLooksRate));
   }
   target.evidence += detection.strength;
   target.quality += (0.5 + 0.5 * detection.strength - target.quality) * 0.2;
