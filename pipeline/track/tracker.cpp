@@ -47,6 +47,13 @@ constexpr double kApartDepth = 0.2;
 // A target may claim part of a region if it was seen on its own so often, and lately [s].
 constexpr int kIndependentHits = 8;
 constexpr double kClaimsFor = 0.7;
+// Recovery of a target that was seen kIndependentHits times: how much its area and its looks may differ, and its
+// disparity as a part; how far from where it was last seen it may be, in sizes; uncertainty of its new speed.
+constexpr double kRecoverArea = 1.6;
+constexpr double kRecoverStrange = 0.25;
+constexpr double kRecoverDepth = 0.06;
+constexpr double kRecoverReach = 1.5;
+constexpr double kRecoverSpeed = 0.2;
 // Smoothing of size and colour: a partly hidden target must not be learnt at once.
 constexpr double kAppearanceRate = 0.2;
 constexpr double kShrinkRate = 0.05;
@@ -234,6 +241,65 @@ void Tracker::associate(std::span<const Detection> detections, bool confirmed) n
     const auto i = static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)]);
     const auto j = static_cast<std::size_t>(detection_of_column_[static_cast<std::size_t>(column)]);
     measure(targets_[i], detections[j], static_cast<std::uint16_t>(j + 1));
+    target_used_[i] = 1;
+    detection_used_[j] = 1;
+  }
+}
+
+// A target that turned at once, or comes out from behind something, is where its motion did not lead: near where it was
+// last seen, at its depth, of its size, and it looks the same.
+double Tracker::recovery_cost(const Target& target, const Detection& detection) const noexcept {
+  if (target.hits < kIndependentHits) return Assignment::kForbidden;
+  const double part = detection.area / std::max(target.area, 1.0);
+  if (part > kRecoverArea || part * kRecoverArea < 1) return Assignment::kForbidden;
+  const double strange = 1 - target.appearance.explains(detection.appearance, part);
+  if (strange > kRecoverStrange) return Assignment::kForbidden;
+  const double z = target.space.position().z();
+  if (target.has_depth && sees_depth(target, detection) && z > 0) {
+    const double expected = view_.focal_baseline / z;
+    const double sd = expected / z * std::sqrt(target.space.position_covariance()(2, 2));
+    if (std::abs(detection.disparity - expected) > 3 * (sd + detection.disparity_sd) + kRecoverDepth * expected) {
+      return Assignment::kForbidden;
+    }
+  }
+  const double step = std::sqrt(square(detection.centre_x() - target.last_x) + square(detection.centre_y() - target.last_y));
+  const double reach = kRecoverReach * std::max(target.width, target.height) +
+                       target.image.velocity().norm() * std::min(target.unseen_s, kClaimsFor);
+  return step <= reach ? step / reach + strange / kRecoverStrange : Assignment::kForbidden;
+}
+
+void Tracker::recover(std::span<const Detection> detections) noexcept {
+  int rows = 0;
+  int columns = 0;
+  for (std::size_t j = 0; j < detections.size(); ++j) {
+    if (detection_used_[j] == 0) detection_of_column_[static_cast<std::size_t>(columns++)] = static_cast<int>(j);
+  }
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
+    if (target_used_[i] == 0 && targets_[i].state != TrackState::kTentative) {
+      target_of_row_[static_cast<std::size_t>(rows++)] = static_cast<int>(i);
+    }
+  }
+  for (int row = 0; row < rows; ++row) {
+    const Target& target = targets_[static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)])];
+    for (int column = 0; column < columns; ++column) {
+      const int j = detection_of_column_[static_cast<std::size_t>(column)];
+      costs_[static_cast<std::size_t>(row * columns + column)] =
+          recovery_cost(target, detections[static_cast<std::size_t>(j)]);
+    }
+  }
+  assignment_.solve(costs_, rows, columns, 2, detection_of_row_);
+  for (int row = 0; row < rows; ++row) {
+    const int column = detection_of_row_[static_cast<std::size_t>(row)];
+    if (column == Assignment::kNone) continue;
+    const auto i = static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)]);
+    const auto j = static_cast<std::size_t>(detection_of_column_[static_cast<std::size_t>(column)]);
+    Target& target = targets_[i];
+    const Detection& detection = detections[j];
+    const Vector2 now(detection.centre_x(), detection.centre_y());
+    const Vector2 way = now - Vector2(target.last_x, target.last_y);
+    target.image.start(now, centre_noise(config_, detection.box), config_.initial_speed * view_.focal * kRecoverSpeed,
+                       way / std::max(target.unseen_s, 1e-3));
+    measure(target, detection, static_cast<std::uint16_t>(j + 1));
     target_used_[i] = 1;
     detection_used_[j] = 1;
   }
@@ -442,6 +508,7 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
   const std::size_t known = targets_.size();
   associate(detections, true);
   associate(detections, false);
+  recover(detections);
   for (std::size_t i = 0; i < known; ++i) {
     if (target_used_[i] == 0) miss(targets_[i]);
   }

@@ -130,6 +130,8 @@ class Tracker {
   [[nodiscard]] bool sees_depth(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] Eigen::Vector2d centre(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double cost(const Target& target, const Detection& detection) const noexcept;
+  [[nodiscard]] double recovery_cost(const Target& target, const Detection& detection) const noexcept;
+  void recover(std::span<const Detection> detections) noexcept;
   void associate(std::span<const Detection> detections, bool confirmed) noexcept;
   void measure(Target& target, const Detection& detection, std::uint16_t label) noexcept;
   void renew_features(Target& target, ImageView<const std::uint8_t> luma,
