@@ -30,8 +30,6 @@ constexpr int kWidestColumnGap = 16;  // [px]
 // A region's match counts if the second best place is at least this much worse.
 constexpr double kUnique = 1.5;
 constexpr double kLeastCost = 9;  // of a region's match, by noise alone [grey levels squared]
-// How far around a region its missing parts are looked for, as a part of its longer side.
-constexpr int kCompletionPercent = 40;
 // Room around a predicted disparity, in standard deviations and as a fraction, for targets that accelerate.
 constexpr double kRangeSd = 3;
 constexpr double kRangeFraction = 0.25;
@@ -229,12 +227,6 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
     canvas_background_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
     if (!canvas_background_.empty()) fill(canvas_background_, {0, 0, canvas.width_left, canvas.height}, kNoDisparity);
     old_disparity_ = arena.image<std::uint16_t>(width, height);
-    samples_ = arena.array<std::uint16_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-    if (config_.shadow.method == ShadowMethod::kStereo &&
-        !keep(depth_completion_, DepthCompletion::create({.own_px = config_.shadow.own_depth_px}, width, height, arena),
-              outcome)) {
-      return outcome;
-    }
   }
   left_.canvas = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
   right_.canvas = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
@@ -266,7 +258,6 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   if (stereo) find_disparity();                   // block matching 3.6, where something moves
   ended(Stage::kDisparity);
   remove_shadows();  // sigma test 3.20-3.23, or stereo first
-  //complete_by_depth();
   ended(Stage::kShadow);
   const Detector::Input objects{.blobs = blobs_.blobs,
                                 .labels = blobs_.labels,
@@ -493,49 +484,6 @@ void Pipeline::take_disparity(const Rect& box, std::uint16_t label) noexcept {
     disparity_.at(x, y) = known ? canvas_disparity_.at(u, v) : kNoDisparity;
     if (background_right_) old_disparity_.at(x, y) = known ? canvas_background_.at(u, v) : kNoDisparity;
   });
-}
-
-// Median of the disparities that are in front of the background, -1 where too few are.
-double Pipeline::median_disparity(const Blob& blob) noexcept {
-  std::size_t count = 0;
-  const int own = static_cast<int>(config_.shadow.own_depth_px * kDisparityScale);
-  for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
-    const int now = disparity_.at(x, y);
-    const int before = old_disparity_.at(x, y);
-    if (now == kNoDisparity || before == kNoDisparity || now - before <= own) return;
-    samples_[count++] = static_cast<std::uint16_t>(now);
-  });
-  if (count * 100 < static_cast<std::size_t>(blob.area) * kEvidencePercent) return -1;
-  const std::span<std::uint16_t> known = samples_.first(count);
-  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(count / 2);
-  std::nth_element(known.begin(), middle, known.end());
-  return *middle / static_cast<double>(kDisparityScale);
-}
-
-// Around each object whose depth is known: the parts of it that look like the background.
-void Pipeline::complete_by_depth() noexcept {
-  if (!depth_completion_) return;
-  for (Blob& blob : blobs_.blobs) {
-    if (blob.area < config_.shape.min_blob_px * 2) continue;
-    const double object = median_disparity(blob);
-    if (object < 0) continue;
-    const int margin = std::clamp(std::max(blob.box.width, blob.box.height) * kCompletionPercent / 100, 6, 64);
-    const Rect window = intersect({blob.box.left - margin, blob.box.top - margin, blob.box.width + 2 * margin,
-                                   blob.box.height + 2 * margin},
-                                  {0, 0, setup_.width, setup_.height});
-    const Rect roi = paint_on_canvas(window, 0);
-    if (roi.empty()) continue;
-    if (config_.disparity.mode == DisparityMode::kRegions) {
-      fill(canvas_disparity_, roi, kNoDisparity);
-      const int most = std::min(static_cast<int>(object * 1.1) + 2, full_range_);
-      run_matcher(left_.canvas, right_.canvas, roi, {0, most}, canvas_disparity_);
-    }
-    take_disparity(window, 0);
-    if (depth_completion_->run({disparity_, old_disparity_}, window, object, blob.label, blobs_.labels) == 0) continue;
-    blob = measure_region(blobs_.labels, window, blob.label);
-    for_each_pixel(blobs_.labels, blob.box, blob.label,
-                   [&](int x, int y) { moving_.at(x, y) = AdaptiveBackground::kForeground; });
-  }
 }
 
 void Pipeline::match_dense() noexcept {

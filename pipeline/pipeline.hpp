@@ -10,7 +10,6 @@
 #include "pipeline/core/result.hpp"
 #include "pipeline/frame.hpp"
 #include "pipeline/geometry/rectify.hpp"
-#include "pipeline/motion/depth_completion.hpp"
 #include "pipeline/motion/mean_background.hpp"
 #include "pipeline/pipeline_config.hpp"
 #include "pipeline/shape/contour_fill.hpp"
@@ -116,8 +115,6 @@ class Pipeline {
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;
-  void complete_by_depth() noexcept;
-  [[nodiscard]] double median_disparity(const Blob& blob) noexcept;
   void take_disparity(const Rect& box, std::uint16_t label) noexcept;
   void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
   [[nodiscard]] bool fits_at(double disparity, const Rect& roi, int area) noexcept;
@@ -139,7 +136,6 @@ class Pipeline {
   BlobSet blobs_;
   std::span<std::uint8_t> typical_distance_;  ///< by label: 75th percentile of the distance
   std::span<std::uint8_t> ghost_;             ///< by label: 1 where most of it lies behind the background
-  std::span<std::uint16_t> samples_;          ///< a region's disparities, for their median
   RejectionCounts rejections_{};
 
   Planes left_;
@@ -172,7 +168,6 @@ class Pipeline {
   std::optional<ConvexHull> convex_hull_;
   std::optional<LevelSet> level_set_;
   std::optional<ShadowTest> shadow_test_;
-  std::optional<DepthCompletion> depth_completion_;
   std::optional<Rectifier> rectifier_;
   std::optional<SadMatcher> sad_;
   std::optional<CensusMatcher> census_;

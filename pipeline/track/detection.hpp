@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 
 #include "pipeline/core/bounded_vector.hpp"
@@ -21,10 +20,9 @@ struct Detection {
   double disparity_reach = 0;                          ///< nine tenths of its pixels are this near the median [px]
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
-  std::array<std::uint8_t, 3> colour{};  ///< mean Y, Cb, Cr over its mask; Cb = Cr = 128 for grey sources
-  Appearance appearance;
-  bool whole = true;                     ///< not cut out of a larger region
-  double strength = 0;                   ///< 0..1, how far above the foreground threshold it stands
+  Appearance appearance;                               ///< over its mask
+  bool whole = true;                                   ///< not cut out of a larger region
+  double strength = 0;                                 ///< 0..1, how far above the foreground threshold it stands
 
   [[nodiscard]] double centre_x() const noexcept { return box.left + (box.width - 1) * 0.5; }
   [[nodiscard]] double centre_y() const noexcept { return box.top + (box.height - 1) * 0.5; }
@@ -45,7 +43,6 @@ struct Prediction {
   double disparity = 0;     ///< [px]
   double disparity_sd = 0;  ///< from the state's covariance [px]
   double disparity_reach = 0;  ///< how far its surface usually reaches from there [px]
-  std::array<std::uint8_t, 3> colour{};
   const Appearance* appearance = nullptr;  ///< null: unknown; valid until the next update()
 
   [[nodiscard]] static std::uint64_t bit(std::uint32_t id) noexcept { return std::uint64_t{1} << (id % 64); }

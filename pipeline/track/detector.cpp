@@ -437,7 +437,6 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   out.area = candidate.area;
   out.whole = candidate.whole;
   out.appearance = candidate.appearance;
-  std::array<std::uint64_t, 3> colour{};
   std::uint64_t strength = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double u_sum = 0;
@@ -445,9 +444,6 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   const bool stereo = candidate.has_depth && in.rectifier != nullptr;
   const double reach = 3 * candidate.scatter + 1;
   for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
-    colour[0] += in.y.at(x, y);
-    colour[1] += in.cb.empty() ? 128U : in.cb.at(x, y);
-    colour[2] += in.cr.empty() ? 128U : in.cr.at(x, y);
     strength += in.strength.at(x, y);
     if (!stereo) return;
     const Rectifier::PointF place = in.rectifier->rectified_from_raw().at(x, y);
@@ -462,7 +458,6 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
     v_sum += place.y;
     out.disparity_sd += 1;
   });
-  for (std::size_t i = 0; i < 3; ++i) out.colour[i] = static_cast<std::uint8_t>(colour[i] / candidate.area);
   out.strength = std::min(static_cast<double>(strength) / candidate.area / 80.0, 1.0);
   const double placed = out.disparity_sd;
   out.disparity_sd = 0;
