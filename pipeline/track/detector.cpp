@@ -19,6 +19,7 @@ constexpr double kClaimPart = 0.25;
 // Targets of which the smaller lies inside the larger by this much are taken for one object.
 constexpr double kNestedPart = 0.6;
 constexpr double kOwnGap = 2;
+constexpr double kMostGrowth = 1.1;
 // Part of a piece's colours that a target must explain to be taken for another part of it.
 constexpr double kAlike = 0.6;
 constexpr double kUnlike = 0.5;
@@ -38,6 +39,10 @@ constexpr double kLeastDisparitySd = 0.10;
 double square(double value) noexcept { return value * value; }
 
 double length(double x, double y) noexcept { return std::sqrt(x * x + y * y); }
+
+bool fits_into(const Rect& whole, const Rect& box) noexcept {
+  return box.width <= kMostGrowth * whole.width + 2 && box.height <= kMostGrowth * whole.height + 2;
+}
 
 int gap(const Rect& a, const Rect& b) noexcept {
   const int across = std::max({a.left - b.right(), b.left - a.right(), 0});
@@ -344,7 +349,8 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
   return best;
 }
 
-bool Detector::belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept {
+bool Detector::belong_together(const Input& in, const Candidate& a, const Candidate& b,
+                               const Rect& united) const noexcept {
   const bool same = a.claim >= 0 && a.claim == b.claim;
   if (a.has_depth && b.has_depth) {
     const double nearer = std::max(a.disparity, b.disparity);
@@ -367,9 +373,9 @@ bool Detector::belong_together(const Input& in, const Candidate& a, const Candid
     if (length(first.vx - second.vx, first.vy - second.vy) > 0.4 * speed + 0.2 * size) return false;
   }
   const Rect& larger = a.area >= b.area ? a.box : b.box;
-  // A target that is known to be one object may have come apart further than strangers may be.
+  // A target that is known to be one object may have come apart further than strangers may be, but not have grown.
   double reach = std::max(larger.width, larger.height);
-  if (same) {
+  if (same && fits_into(in.predictions[static_cast<std::size_t>(a.claim)].box, united)) {
     const Rect& whole = in.predictions[static_cast<std::size_t>(a.claim)].box;
     reach = kOwnGap * std::max({larger.width, larger.height, whole.width, whole.height});
   }
@@ -381,17 +387,22 @@ void Detector::merge(const Input& in) noexcept {
     while (candidates_[i].root != i) i = candidates_[i].root;
     return i;
   };
+  for (Candidate& candidate : candidates_) candidate.united = candidate.box;
+  bool merged = false;
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     if (candidates_[i].area == 0) continue;
     for (std::size_t j = i + 1; j < candidates_.size(); ++j) {
       if (candidates_[j].area == 0) continue;
       const std::size_t a = root_of(i);
       const std::size_t b = root_of(j);
-      if (a == b || !belong_together(in, candidates_[i], candidates_[j])) continue;
+      if (a == b) continue;
+      const Rect united = unite(candidates_[a].united, candidates_[b].united);
+      if (!belong_together(in, candidates_[i], candidates_[j], united)) continue;
       candidates_[std::max(a, b)].root = static_cast<std::uint16_t>(std::min(a, b));
+      candidates_[std::min(a, b)].united = united;
+      merged = true;
     }
   }
-  bool merged = false;
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     const std::size_t root = root_of(i);
     if (root == i || candidates_[i].area == 0) continue;
@@ -400,7 +411,6 @@ void Detector::merge(const Input& in) noexcept {
     candidates_[root].box = unite(candidates_[root].box, candidates_[i].box);
     if (candidates_[root].claim < 0) candidates_[root].claim = candidates_[i].claim;
     candidates_[i].area = 0;
-    merged = true;
   }
   if (!merged) return;
   for (Candidate& candidate : candidates_) {

@@ -93,7 +93,8 @@ class Detector {
     double scatter;       ///< median absolute deviation [px]
     double reach;         ///< nine tenths of its pixels are this near the median [px]
     Appearance appearance;
-    std::uint16_t root;   ///< used while merging
+    std::uint16_t root;   ///< used while merging: index of the candidate that this one goes to
+    Rect united;          ///< and the box of all that go to this one
   };
 
   /// Faults: kBadConfig, kBadSize, kOutOfMemory.
@@ -132,7 +133,8 @@ class Detector {
                                    double likeness) const noexcept;
   [[nodiscard]] bool resembles(const Prediction& target, const Candidate& candidate) const noexcept;
   [[nodiscard]] int claim_of(const Input& in, const Candidate& candidate) const noexcept;
-  [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b) const noexcept;
+  [[nodiscard]] bool belong_together(const Input& in, const Candidate& a, const Candidate& b,
+                                     const Rect& united) const noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
   void reject(Rejection why) noexcept { ++rejections_[static_cast<std::size_t>(why)]; }
 

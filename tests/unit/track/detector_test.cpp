@@ -34,7 +34,7 @@ Detector::Config config() {
   c.merge_depth = 0.1;
   c.split_depth = 0.15;
   c.split_min_px = 2;
-  c.split_known = 0.5;
+  c.split_jump = 0.05;
   c.split_part = 0.12;
   c.most_scatter = 0.15;
   c.match_noise_px = 0.25;
@@ -58,6 +58,7 @@ Prediction expected(std::uint32_t id, const Rect& box, double disparity = 0) {
   out.independent = true;
   out.apart = ~std::uint64_t{0};
   out.box = box;
+  out.area = static_cast<double>(box.area());
   out.image_sd = 1;
   out.has_depth = disparity > 0;
   out.disparity = disparity;
@@ -152,7 +153,8 @@ TEST_F(DetectorOf, PositionByHand) {
   // s_Z = Z^2 / (f b) s_d
   EXPECT_GT(object.disparity_sd, 0);
   EXPECT_NEAR(std::sqrt(object.position_covariance(2, 2)), 0.25 * object.disparity_sd, 0.02);
-  EXPECT_EQ(object.colour, (std::array<std::uint8_t, 3>{77, 128, 128}));
+  EXPECT_DOUBLE_EQ(object.appearance.share(77, 128, 128), 0.5) << "half in its bin, half in the next";
+  EXPECT_EQ(object.appearance.share(200, 128, 128), 0);
   EXPECT_GT(object.strength, 0);
   EXPECT_LE(object.strength, 1);
 }

@@ -49,8 +49,7 @@ Detection seen_at(double x, double y, double disparity = 0) {
   Detection out;
   out.box = {static_cast<int>(std::lround(x)) - 12, static_cast<int>(std::lround(y)) - 12, 24, 24};
   out.area = 450;
-  out.colour = {120, 128, 128};
-  out.strength = 0.5;
+  out.strength = 1;
   (void)out.hull.push({out.box.left, out.box.top});
   if (disparity <= 0) return out;
   out.has_depth = true;
@@ -334,7 +333,7 @@ TEST_F(TrackerOf, PredictionIsWhereTheTargetWillBe) {
   EXPECT_TRUE(prediction.has_depth);
   EXPECT_NEAR(prediction.disparity, 20, 0.5);
   EXPECT_GT(prediction.disparity_sd, 0);
-  EXPECT_EQ(prediction.colour[0], 120);
+  ASSERT_NE(prediction.appearance, nullptr);
 }
 
 TEST_F(TrackerOf, UncertaintyOfThePredictionGrowsWithTime) {
