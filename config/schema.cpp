@@ -147,7 +147,7 @@ std::vector<Key> keys_of(Configuration& c) {
       key("objects.split_min_px", p.objects.split_min_px, 0.5, 50, "px", "And at least this much."),
       key("objects.split_jump", p.objects.split_jump, 0.005, 1, "disparity",
           "Step in disparity between neighbours that is an edge in depth, as a fraction of the disparity."),
-      key("objects.split_part", p.objects.split_part, 0.032, 0.5, "area",
+      key("objects.split_part", p.objects.split_part, 0.001, 0.5, "area",
           "Part of a region that a layer of depth needs to be an object."),
       key("objects.most_scatter", p.objects.most_scatter, 0.01, 1, "disparity",
           "Scatter of disparity, as a fraction of it, above which a new object is rejected as inconsistent."),

@@ -20,7 +20,7 @@ constexpr int kLumaStep = 4;
 }  // namespace
 
 Result<DepthSegments> DepthSegments::create(const Config& config, int width, int height, Arena& arena) noexcept {
-  if (!(config.jump > 0) || !(config.jump_px > 0) || config.min_px < 1 || !(config.min_part * kMost >= 1) ||
+  if (!(config.jump > 0) || !(config.jump_px > 0) || config.min_px < 1 || !(config.min_part >= 0) ||
       !(config.min_part <= 0.5)) {
     return fail(Fault::kBadConfig);
   }

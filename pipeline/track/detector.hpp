@@ -60,7 +60,7 @@ class Detector {
     double split_depth = 0.20;     ///< gap between layers, as a fraction of the disparity, 0.01..1
     double split_min_px = 2.0;     ///< and at least this much [px], 0.5..50
     double split_jump = 0.05;      ///< step between neighbours that is an edge in depth, as a fraction, 0.005..1
-    double split_part = 0.04;      ///< a layer is at least this part of its blob, 1/32..0.5
+    double split_part = 0.02;      ///< a layer is at least this part of its blob, 0.001..0.5
     double most_scatter = 0.15;    ///< median absolute deviation of an object's disparities, as a fraction, 0.01..1
     double match_noise_px = 0.25;  ///< standard deviation of a disparity [px], 0.02..5
   };

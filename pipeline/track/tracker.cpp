@@ -57,6 +57,8 @@ constexpr double kRecoverSpeed = 0.2;
 // Smoothing of size and colour: a partly hidden target must not be learnt at once.
 constexpr double kAppearanceRate = 0.2;
 constexpr double kShrinkRate = 0.05;
+constexpr double kHiddenPart = 0.6;
+constexpr double kHiddenRate = 0.01;
 constexpr double kLooksRate = 0.05;
 constexpr double kMostLooksRate = 0.3;
 constexpr double kBlindMargin = 4;  // [px]
@@ -325,7 +327,9 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   target.whole = detection.whole;
   if (detection.whole) ++target.whole_hits;
   const double rate = target.hits < 5 ? 1.0 / target.hits : kAppearanceRate;
-  const double shrink = target.hits < 5 ? rate : kShrinkRate;
+  // An object gets smaller little by little; one that lost half at once is partly hidden.
+  const bool hidden = detection.area < kHiddenPart * target.area;
+  const double shrink = target.hits < 5 ? rate : hidden ? kHiddenRate : kShrinkRate;
   target.width += (detection.box.width - target.width) * (detection.box.width > target.width ? rate : shrink);
   target.height += (detection.box.height - target.height) * (detection.box.height > target.height ? rate : shrink);
   const double known_area = target.area;

@@ -91,9 +91,41 @@ TEST(ForegroundMask, UnderTheLowThresholdNothingIsACandidate) {
   Plane distance = quiet();
   distance(cv::Rect(20, 10, 12, 9)).setTo(12 * kStep);
   distance(cv::Rect(32, 10, 12, 9)).setTo(4 * kStep - 1);
-  EXPECT_EQ(cv::countNonZero(run(distance).mask(cv::Rect(33, 0, 31, 48))), 0);
+  ForegroundMask::Config c = config();
+  c.faint_sd = 30;
+  EXPECT_EQ(cv::countNonZero(run(distance, c).mask(cv::Rect(33, 0, 31, 48))), 0);
   distance(cv::Rect(32, 10, 12, 9)).setTo(4 * kStep);
-  EXPECT_EQ(cv::countNonZero(run(distance).mask), 24 * 9 - 4);
+  EXPECT_EQ(cv::countNonZero(run(distance, c).mask), 24 * 9 - 4);
+}
+
+TEST(ForegroundMask, FaintAreaIsForegroundOnlyWhereItHangsOnAStrongOne) {
+  const cv::Rect area(12, 12, 24, 20);
+  Plane distance = quiet();
+  distance(area).setTo(2 * kStep);  // under low_sd = 4, over faint_sd = 1.25
+  EXPECT_EQ(cv::countNonZero(run(distance).mask), 0) << "alone";
+  distance(cv::Rect(36, 12, 8, 20)).setTo(8 * kStep);
+  const Plane mask = run(distance).mask;
+  EXPECT_EQ(test::part(mask, test::inner(area, 2)), 1);
+  EXPECT_EQ(test::part(mask, {37, 13, 6, 18}), 1);
+  // Where the 5x5 around is all quiet, nothing is added.
+  EXPECT_EQ(cv::countNonZero(mask) - cv::countNonZero(mask(cv::Rect(10, 10, 36, 24))), 0);
+}
+
+TEST(ForegroundMask, FaintAreaCountsByItsMeanNotByItsPixels) {
+  // Pixels of 1 and 2 sd in turn: the mean of 5x5 is (13 + 24) / 25 or (26 + 12) / 25 sd, 1.48 and 1.52.
+  const cv::Rect area(12, 12, 24, 20);
+  Plane distance = quiet();
+  distance(cv::Rect(36, 12, 8, 20)).setTo(8 * kStep);
+  for (int y = area.y; y < area.br().y; ++y) {
+    for (int x = area.x; x < area.br().x; ++x) distance(y, x) = (x + y) % 2 == 0 ? 2 * kStep : kStep;
+  }
+  const auto kept = [&](double faint_sd) {
+    ForegroundMask::Config c = config();
+    c.faint_sd = faint_sd;
+    return test::part(run(distance, c).mask, test::inner(area, 4));
+  };
+  EXPECT_EQ(kept(1.25), 1);
+  EXPECT_EQ(kept(1.75), 0);
 }
 
 TEST(ForegroundMask, HaloOfAStrongObjectIsTrimmed) {

@@ -47,6 +47,7 @@ struct Scene {
   Plane distance = Plane(kSize, std::uint8_t{100});
   cv::Mat_<std::uint16_t> labels = cv::Mat_<std::uint16_t>(kSize, std::uint16_t{0});
   std::array<std::uint8_t, 2> typical{0, 100};
+  std::array<std::uint8_t, 2> ghost{0, 0};
 
   Scene() {
     mask(kRegion).setTo(255);
@@ -64,6 +65,7 @@ struct Scene {
     in.distance = view(distance);
     in.labels = view(labels);
     in.typical = typical;
+    in.ghost = ghost;
     in.disparity = view(disparity);
     in.disparity_background = view(disparity_background);
     return in;
@@ -169,14 +171,49 @@ TEST(ShadowTest, NearerThanTheBackgroundIsKeptWhateverItLooksLike) {
   EXPECT_EQ(scene.left(), 0) << "one pixel apart is the same surface";
 }
 
-TEST(ShadowTest, BehindTheBackgroundIsRemovedWhateverItLooksLike) {
+TEST(ShadowTest, BehindTheBackgroundIsRemovedFromAGhostWhateverItLooksLike) {
   Scene scene;
+  scene.ghost[1] = 1;
   scene.y = scaled(random_plane(kSize, 90, 190, 2), 1.2);
   scene.disparity_background = disparities(10);
   scene.disparity = disparities(8.9375);
   EXPECT_EQ(scene.left(), 0);
   scene.disparity = disparities(9);
   EXPECT_EQ(scene.left(), 1) << "one pixel apart is the same surface";
+}
+
+TEST(ShadowTest, BehindTheBackgroundInAnotherRegionTheLookDecidesAsWithoutStereo) {
+  Scene scene;
+  scene.ghost[0] = 1;  // of no region
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(8);
+  scene.y = scaled(random_plane(kSize, 90, 190, 2), 1.2);
+  EXPECT_EQ(scene.left(), 1) << "an object before a background of a wrong disparity";
+  scene.y = scaled(scene.y_background, 0.6);
+  EXPECT_EQ(scene.left(), 0) << "a shadow";
+  scene.y = scaled(scene.y_background, 1.2);
+  EXPECT_EQ(scene.left(), 1) << "brighter, which only stereo could call the background";
+}
+
+TEST(ShadowTest, GhostRegionBesideAnObjectIsToldByItsLabel) {
+  Scene scene;
+  const cv::Rect right(kRegion.x + kRegion.width / 2, kRegion.y, kRegion.width / 2, kRegion.height);
+  scene.labels(right).setTo(2);
+  scene.y = scaled(random_plane(kSize, 90, 190, 2), 1.2);
+  scene.disparity_background = disparities(10);
+  scene.disparity = disparities(8);
+  const std::array<std::uint8_t, 3> typical{0, 100, 100};
+  const std::array<std::uint8_t, 3> ghost{0, 0, 1};
+  ShadowTest::Input in = scene.input();
+  in.typical = typical;
+  in.ghost = ghost;
+  Arena arena;
+  auto stage = ShadowTest::create(config(), kSize.width, kSize.height, arena);
+  ASSERT_TRUE(stage.has_value());
+  EXPECT_GT(stage->run(in, view(scene.mask)), 0U);
+  // The vote over 5x5 rounds the corners where the two touch.
+  EXPECT_EQ(test::part(scene.mask, {kRegion.x, kRegion.y, right.width - 2, kRegion.height}), 1);
+  EXPECT_EQ(test::part(scene.mask, {right.x + 2, right.y, right.width - 2, right.height}), 0);
 }
 
 TEST(ShadowTest, OnTheBackgroundsOwnSurfaceTheLookDecidesWithWiderTolerances) {

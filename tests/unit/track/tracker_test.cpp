@@ -63,6 +63,25 @@ Detection seen_at(double x, double y, double disparity = 0) {
   return out;
 }
 
+/// The same for any box; its area is nine tenths of it.
+Detection box_at(const Rect& box, double disparity = 0) {
+  Detection out = seen_at(box.left + box.width / 2, box.top + box.height / 2, disparity);
+  out.box = box;
+  out.area = static_cast<int>(box.area() * 9 / 10);
+  return out;
+}
+
+struct Colour {
+  std::uint8_t y, cb, cr;
+};
+constexpr Colour kRed{90, 100, 180};
+constexpr Colour kBlue{90, 180, 100};
+
+Detection painted(Detection detection, const Colour& colour) {
+  for (int i = 0; i < 100; ++i) detection.appearance.add(colour.y, colour.cb, colour.cr);
+  return detection;
+}
+
 class TrackerOf : public testing::Test {
  protected:
   void SetUp() override { make(config()); }
@@ -94,6 +113,12 @@ class TrackerOf : public testing::Test {
     EXPECT_LT(least, 8) << "nobody near " << x << ' ' << y;
     return best;
   }
+  [[nodiscard]] const TrackReport* with_id(std::uint32_t id) const {
+    for (const TrackReport& report : reports()) {
+      if (report.id == id) return &report;
+    }
+    return nullptr;
+  }
 
   std::optional<Tracker> tracker;
 
@@ -121,6 +146,91 @@ TEST_F(TrackerOf, StraightTargetIsConfirmedByConfirmHitsDetections) {
       EXPECT_EQ(reports()[0].state, k < hits ? TrackState::kTentative : TrackState::kConfirmed) << hits << ' ' << k;
     }
   }
+}
+
+TEST_F(TrackerOf, WeakDetectionsConfirmLater) {
+  // Strengths that add up without rounding; confirm_hits is 3.
+  struct Case {
+    double strength, evidence;
+    int frames;
+  };
+  for (const Case& one : {Case{1, 2, 3}, Case{0.5, 2, 4}, Case{0.25, 2, 8}, Case{0.25, 0, 3}, Case{0.25, 4, 16}}) {
+    Tracker::Config c = config();
+    c.confirm_evidence = one.evidence;
+    make(c);
+    for (int k = 1; k <= one.frames + 2; ++k) {
+      Detection detection = seen_at(100 + 6 * k, 200);
+      detection.strength = one.strength;
+      step({detection});
+      ASSERT_EQ(reports().size(), 1U);
+      EXPECT_EQ(reports()[0].state, k < one.frames ? TrackState::kTentative : TrackState::kConfirmed)
+          << one.strength << ' ' << one.evidence << ' ' << k;
+    }
+  }
+}
+
+TEST_F(TrackerOf, DetectionsWithoutStrengthConfirmNothing) {
+  for (int k = 0; k < 30; ++k) {
+    Detection detection = seen_at(100 + 6 * k, 200);
+    detection.strength = 0;
+    step({detection});
+  }
+  EXPECT_EQ(count(TrackState::kTentative), 1);
+  EXPECT_EQ(reports().size(), 1U);
+}
+
+TEST_F(TrackerOf, PartlyHiddenTargetKeepsItsCentre) {
+  for (const bool right_half : {false, true}) {
+    make(config());
+    double x = 100;
+    for (int k = 0; k < 30; ++k, x += 4) step({seen_at(x, 200)});
+    for (int k = 0; k < 6; ++k, x += 4) {
+      Detection half = seen_at(x, 200);
+      half.box.width = 12;  // its own middle is 6 px off
+      if (right_half) half.box.left += 12;
+      half.area /= 2;
+      step({half});
+      ASSERT_EQ(reports().size(), 1U);
+      EXPECT_TRUE(reports()[0].measured);
+      EXPECT_NEAR(reports()[0].image_x, x, 2) << right_half << ' ' << k;
+      EXPECT_EQ(reports()[0].box, half.box) << "the box is what is visible";
+    }
+    EXPECT_NEAR(reports()[0].image_vx, 100, 25);
+  }
+}
+
+TEST_F(TrackerOf, TargetWithSomethingAddedToItsBoxKeepsItsCentre) {
+  double x = 100;
+  for (int k = 0; k < 30; ++k, x += 4) step({seen_at(x, 200)});
+  Detection larger = seen_at(x, 200);
+  larger.box.width += 10;  // 5 px off
+  larger.area += 200;
+  step({larger});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_NEAR(reports()[0].image_x, x, 1.5);
+}
+
+TEST_F(TrackerOf, BoxOfTheUsualSizeMovesTheCentre) {
+  // Where no part can be hidden, the centre follows what is seen: the control of the two tests before.
+  double x = 100;
+  for (int k = 0; k < 30; ++k, x += 4) step({seen_at(x, 200)});
+  for (int k = 0; k < 6; ++k, x += 4) step({seen_at(x - 6, 200)});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_LT(reports()[0].image_x, x - 4 - 3.5);
+}
+
+TEST_F(TrackerOf, SizeGrowsFastAndShrinksSlowly) {
+  const auto width_after = [&](int width) {
+    make(config());
+    for (int k = 0; k < 20; ++k) step({box_at({100 + 4 * k, 200, 30, 30})});
+    EXPECT_NEAR(tracker->predict(0)[0].box.width, 30, 1);
+    for (int k = 20; k < 25; ++k) step({box_at({100 + 4 * k - (width - 30) / 2, 200, width, 30})});
+    EXPECT_EQ(reports().size(), 1U);
+    return tracker->predict(0)[0].box.width;
+  };
+  EXPECT_GE(width_after(46), 38) << "more than half of the way";
+  EXPECT_GE(width_after(14), 25) << "less than a third of it";
+  EXPECT_LT(width_after(14), 30) << "but some";
 }
 
 TEST_F(TrackerOf, ReportTellsWhereAndHowFast) {
@@ -246,6 +356,145 @@ TEST_F(TrackerOf, CoastingTargetThatLeavesThePictureEnds) {
   EXPECT_TRUE(reports().empty());
 }
 
+TEST_F(TrackerOf, TargetThatLeavesIsNotHandedOverToAStrangerThatEntersThere) {
+  const auto visible = [](double x) {
+    Detection out = seen_at(x, 200);
+    const Rect box = intersect(out.box, {0, 0, kWidth, kHeight});
+    out.area = out.area * box.width / out.box.width;
+    out.box = box;
+    return out;
+  };
+  const auto ids_of_the_second = [&](const Colour& colour) {
+    make(config());
+    for (double x = 400; x <= 640; x += 8) step({painted(visible(x), kRed)});
+    EXPECT_EQ(reports().size(), 1U);
+    EXPECT_TRUE(reports()[0].measured);
+    std::vector<std::uint32_t> ids;
+    for (double x = 646; x >= 590; x -= 8) {
+      step({painted(visible(x), colour)});
+      for (const TrackReport& report : reports()) {
+        if (report.measured) ids.push_back(report.id);
+      }
+    }
+    return ids;
+  };
+  EXPECT_EQ(ids_of_the_second(kBlue), std::vector<std::uint32_t>(8, 2));
+  EXPECT_EQ(with_id(1), nullptr) << "it has left";
+  EXPECT_EQ(ids_of_the_second(kRed), std::vector<std::uint32_t>(8, 1)) << "one that turned: only the looks told";
+}
+
+TEST_F(TrackerOf, CentreOfATargetAtTheBorderIsTakenFromTheEdgeThatIsSeen) {
+  // It leaves at the left, faster than expected. Half of it visible, its centre is at the border.
+  double x = 50;
+  for (; x > 12; x -= 2) step({seen_at(x, 200)});
+  for (; x > -8; x -= 6) {
+    Detection cut = seen_at(x, 200);
+    cut.box = intersect(cut.box, {0, 0, kWidth, kHeight});
+    cut.area = cut.area * cut.box.width / 24;
+    step({cut});
+    ASSERT_EQ(reports().size(), 1U);
+    EXPECT_TRUE(reports()[0].measured);
+    EXPECT_NEAR(reports()[0].image_x, x, 4);
+  }
+}
+
+TEST_F(TrackerOf, TargetThatTurnsAtOnceIsRecoveredByItsLooks) {
+  struct Case {
+    const char* what;
+    Detection detection;
+    std::uint32_t id;
+  };
+  // 20 frames at 8 px each, the last at 252; the next is expected at 260 and seen 30 px before that, out of the gate.
+  const double x = 230;
+  Detection larger = painted(seen_at(x, 200, 20), kRed);
+  larger.area *= 3;
+  const std::vector<Case> cases{
+      {"the same", painted(seen_at(x, 200, 20), kRed), 1},
+      {"a stranger by its looks", painted(seen_at(x, 200, 20), kBlue), 2},
+      {"a stranger by its size", larger, 2},
+      {"a stranger by its depth", painted(seen_at(x, 200, 30), kRed), 2},
+      {"a stranger by its place", painted(seen_at(x, 320, 20), kRed), 2},
+  };
+  for (const Case& one : cases) {
+    make(config());
+    for (int k = 0; k < 20; ++k) step({painted(seen_at(100 + 8 * k, 200, 20), kRed)});
+    ASSERT_EQ(reports().size(), 1U);
+    step({one.detection});
+    ASSERT_EQ(reports().size(), one.id) << one.what;
+    EXPECT_TRUE(reports().back().measured);
+    EXPECT_EQ(reports().back().id, one.id);
+    EXPECT_EQ(reports().front().measured, one.id == 1) << one.what;
+  }
+}
+
+TEST_F(TrackerOf, RecoveredTargetGoesOnTheOtherWay) {
+  for (int k = 0; k < 20; ++k) step({painted(seen_at(100 + 8 * k, 200, 20), kRed)});
+  for (int k = 1; k < 15; ++k) {
+    step({painted(seen_at(238 - 8 * k, 200, 20), kRed)});
+    ASSERT_EQ(reports().size(), 1U) << k;
+    EXPECT_EQ(reports()[0].id, 1U);
+    EXPECT_TRUE(reports()[0].measured);
+  }
+  EXPECT_NEAR(reports()[0].image_vx, -200, 40);
+}
+
+TEST_F(TrackerOf, FragmentThatGoesAlongWithABodyIsDropped) {
+  struct Case {
+    const char* what;
+    double dx, dy, disparity, turn;
+    bool dropped;
+  };
+  for (const Case& one : {
+           Case{"under it", 0, 40, 20, 0, true},
+           Case{"far away", 0, 120, 20, 0, false},
+           Case{"nearer", 0, 40, 30, 0, false},
+           Case{"on another way", 0, 40, 20, 6, false},
+       }) {
+    make(config());
+    int gone = 0;
+    for (int k = 1; k <= 25; ++k) {
+      const int x = 100 + 6 * k;
+      const double y = 100 + one.dy + one.turn * k;
+      step({box_at({x, 100, 24, 40}, 20),
+            box_at({x + static_cast<int>(one.dx), static_cast<int>(y), 24, 12}, one.disparity)});
+      ASSERT_NE(with_id(1), nullptr) << one.what;
+      if (gone == 0 && with_id(2) == nullptr) gone = k;
+    }
+    if (one.dropped) {
+      EXPECT_GE(gone, 8) << one.what;
+      EXPECT_LE(gone, 14) << one.what;
+    } else {
+      EXPECT_EQ(gone, 0) << one.what;
+    }
+  }
+}
+
+TEST_F(TrackerOf, WhatSlidesAlongABodyIsNoFragmentOfIt) {
+  // Under it for 24 frames, at its depth, but 2.5 px a frame faster.
+  for (int k = 1; k <= 24; ++k) {
+    const int x = 100 + 6 * k;
+    step({box_at({x, 100, 60, 40}, 20), box_at({x - 12 + k * 5 / 2, 140, 24, 24}, 20)});
+    ASSERT_EQ(reports().size(), 2U) << k;
+    EXPECT_EQ(reports()[1].id, 2U) << k;
+  }
+}
+
+TEST_F(TrackerOf, OnlyTargetsFarApartInThePictureOrInDepthAreKnownToBeTwo) {
+  const auto apart = [&](int gap, double disparity) {
+    make(config());
+    for (int k = 0; k < 5; ++k) {
+      step({box_at({100 + 3 * k, 100, 24, 40}, 20), box_at({124 + gap + 3 * k, 100, 24, 40}, disparity)});
+    }
+    const std::span<const Prediction> predictions = tracker->predict(kDt);
+    EXPECT_EQ(predictions.size(), 2U);
+    EXPECT_EQ(predictions[0].seen_beside(predictions[1]), predictions[1].seen_beside(predictions[0]));
+    return predictions[0].seen_beside(predictions[1]);
+  };
+  EXPECT_FALSE(apart(4, 20)) << "may be pieces of one";
+  EXPECT_TRUE(apart(40, 20)) << "a size between them";
+  EXPECT_TRUE(apart(4, 30)) << "5 m and 3.3 m away";
+}
+
 TEST_F(TrackerOf, CoastIsTimeNotFrames) {
   for (double dt : {0.01, 0.2}) {
     make(config());
@@ -334,6 +583,33 @@ TEST_F(TrackerOf, PredictionIsWhereTheTargetWillBe) {
   EXPECT_NEAR(prediction.disparity, 20, 0.5);
   EXPECT_GT(prediction.disparity_sd, 0);
   ASSERT_NE(prediction.appearance, nullptr);
+  EXPECT_FALSE(prediction.appearance->known()) << "nobody said what it looks like";
+}
+
+TEST_F(TrackerOf, PredictionKnowsLooksAndReachOfTheTarget) {
+  for (int k = 0; k <= 25; ++k) {
+    Detection detection = painted(seen_at(100 + 4 * k, 150, 20), kRed);
+    detection.disparity_reach = 3;
+    step({detection});
+  }
+  const Prediction prediction = tracker->predict(kDt)[0];
+  EXPECT_NEAR(prediction.disparity_reach, 3, 1e-6);
+  ASSERT_NE(prediction.appearance, nullptr);
+  EXPECT_NEAR(prediction.appearance->explains(painted({}, kRed).appearance), 1, 1e-4);
+  EXPECT_EQ(prediction.appearance->explains(painted({}, kBlue).appearance), 0);
+}
+
+TEST_F(TrackerOf, LooksDecideWhereTwoDetectionsAreEquallyNear) {
+  for (const bool swapped : {false, true}) {
+    make(config());
+    for (int k = 0; k < 20; ++k) step({painted(seen_at(100 + 4 * k, 200), kRed)});
+    const std::vector<Detection> both{painted(seen_at(180, 195), swapped ? kRed : kBlue),
+                                      painted(seen_at(180, 205), swapped ? kBlue : kRed)};
+    step(both);
+    ASSERT_EQ(reports().size(), 2U);
+    EXPECT_EQ(reports()[0].id, 1U);
+    EXPECT_EQ(reports()[0].box, both[swapped ? 0 : 1].box);
+  }
 }
 
 TEST_F(TrackerOf, UncertaintyOfThePredictionGrowsWithTime) {
