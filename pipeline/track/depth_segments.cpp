@@ -16,6 +16,8 @@ constexpr std::uint16_t kLoose = 0xFFFF;    // belongs to no large component
 constexpr std::uint16_t kUnseen = 0xFFFE;   // not reached by the flood yet
 constexpr int kSweeps = 2;
 constexpr int kLumaStep = 4;
+constexpr double kSmallPart = 0.05;
+constexpr double kSmallKnown = 0.6;
 
 }  // namespace
 
@@ -91,7 +93,10 @@ int DepthSegments::flood(const Input& in, const Blob& blob, int least) noexcept 
         queue_[last++] = {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
       }
     }
-    if (last >= static_cast<std::size_t>(least) && static_cast<double>(known) >= config_.min_known * static_cast<double>(last) && found < kMost) {
+    // A small one must be sure of itself.
+    const double needed = static_cast<double>(last) < kSmallPart * blob.area ? kSmallKnown : config_.min_known;
+    const bool sure = static_cast<double>(known) >= needed * static_cast<double>(last);
+    if (last >= static_cast<std::size_t>(least) && sure && found < kMost) {
       ++found;
     } else {
       for (std::size_t i = 0; i < last; ++i) segment_.at(queue_[i].x, queue_[i].y) = kLoose;
