@@ -21,12 +21,12 @@ namespace stereotrack {
 class ForegroundMask {
  public:
   struct Config {
-    double low_sd = 4.0;    ///< candidate [standard deviations], 0.5..30
+    double low_sd = 4.0;     ///< candidate [standard deviations], 0.5..30
     double faint_sd = 1.25;  ///< candidate, as the mean of 5x5 [standard deviations], 0.5..30
-    double high_sd = 8.0;   ///< seed [standard deviations], low_sd..60
-    int halo_percent = 25;  ///< 0..90; 0 keeps the halo
-    int min_seeds = 5;      ///< seeds that a component needs [px], 1..10000
-    int max_runs = 65536;   ///< runs of the mask; more are dropped and counted
+    double high_sd = 8.0;    ///< seed [standard deviations], low_sd..60
+    int halo_percent = 25;   ///< 0..90; 0 keeps the halo
+    int min_seeds = 5;       ///< seeds that a component needs [px], 1..10000
+    int max_runs = 65536;    ///< runs of the mask; more are dropped and counted
   };
 
   /// Faults: kBadConfig, kBadSize, kOutOfMemory.

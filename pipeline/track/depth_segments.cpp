@@ -12,8 +12,8 @@ namespace stereotrack {
 namespace {
 
 constexpr std::uint16_t kFar = 0xFFFF;
-constexpr std::uint16_t kLoose = 0xFFFF;    // belongs to no large component
-constexpr std::uint16_t kUnseen = 0xFFFE;   // not reached by the flood yet
+constexpr std::uint16_t kLoose = 0xFFFF;   // belongs to no large component
+constexpr std::uint16_t kUnseen = 0xFFFE;  // not reached by the flood yet
 constexpr int kSweeps = 2;
 constexpr int kLumaStep = 4;
 constexpr double kSmallPart = 0.05;

@@ -27,11 +27,11 @@ class DepthSegments {
   static constexpr int kMost = 32;
 
   struct Config {
-    double jump = 0.05;     ///< of the disparity, 0.005..1
-    double jump_px = 1.0;   ///< 0.1..50 [px]
-    int min_px = 24;        ///< 1..1e6
-    double min_part = 0.01; ///< 0..0.5
-    double min_known = 0.2; ///< part of a component's pixels whose own disparity must be known, 0..1
+    double jump = 0.05;      ///< of the disparity, 0.005..1
+    double jump_px = 1.0;    ///< 0.1..50 [px]
+    int min_px = 24;         ///< 1..1e6
+    double min_part = 0.01;  ///< 0..0.5
+    double min_known = 0.2;  ///< part of a component's pixels whose own disparity must be known, 0..1
   };
 
   struct Input {
@@ -41,10 +41,10 @@ class DepthSegments {
   };
 
   /// Faults: kBadConfig, kBadSize, kOutOfMemory.
-  [[nodiscard]] static Result<DepthSegments> create(const Config& config, int width, int height,
-                                                    Arena& arena) noexcept;
+  [[nodiscard]] static Result<DepthSegments> create(const Config& config, int width, int height, Arena& arena) noexcept;
 
-  /// Number of segments, 1..kMost; what would be more is noise, too. segment() then holds 0..n-1 at the blob's pixels, and anything elsewhere.
+  /// Number of segments, 1..kMost; what would be more is noise, too. segment() then holds 0..n-1 at the blob's pixels,
+  /// and anything elsewhere.
   [[nodiscard]] int run(const Input& in, const Blob& blob) noexcept;
 
   [[nodiscard]] ImageView<const std::uint16_t> segment() const noexcept { return segment_; }

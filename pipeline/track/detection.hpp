@@ -20,9 +20,9 @@ struct Detection {
   double disparity_reach = 0;                          ///< nine tenths of its pixels are this near the median [px]
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
-  Appearance appearance;                               ///< over its mask
-  bool whole = true;                                   ///< not cut out of a larger region
-  double strength = 0;                                 ///< 0..1, how far above the foreground threshold it stands
+  Appearance appearance;  ///< over its mask
+  bool whole = true;      ///< not cut out of a larger region
+  double strength = 0;    ///< 0..1, how far above the foreground threshold it stands
 
   [[nodiscard]] double centre_x() const noexcept { return box.left + (box.width - 1) * 0.5; }
   [[nodiscard]] double centre_y() const noexcept { return box.top + (box.height - 1) * 0.5; }
@@ -40,9 +40,9 @@ struct Prediction {
   double vy = 0;
   double image_sd = 0;  ///< standard deviation of its centre, the larger axis [px]
   bool has_depth = false;
-  double disparity = 0;     ///< [px]
-  double disparity_sd = 0;  ///< from the state's covariance [px]
-  double disparity_reach = 0;  ///< how far its surface usually reaches from there [px]
+  double disparity = 0;                    ///< [px]
+  double disparity_sd = 0;                 ///< from the state's covariance [px]
+  double disparity_reach = 0;              ///< how far its surface usually reaches from there [px]
   const Appearance* appearance = nullptr;  ///< null: unknown; valid until the next update()
 
   [[nodiscard]] static std::uint64_t bit(std::uint32_t id) noexcept { return std::uint64_t{1} << (id % 64); }

@@ -186,8 +186,7 @@ std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
   return best;
 }
 
-void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob,
-                             bool whole) noexcept {
+void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob, bool whole) noexcept {
   Candidate candidate{};
   candidate.label = label;
   candidate.blob = blob;
@@ -208,9 +207,8 @@ void Detector::split(const Input& in, const Blob& blob) noexcept {
   const std::uint16_t first = next_label_;
   next_label_ = static_cast<std::uint16_t>(next_label_ + segments);
   const ImageView<const std::uint16_t> segment = segments_.segment();
-  for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
-    in.labels.at(x, y) = static_cast<std::uint16_t>(first + segment.at(x, y));
-  });
+  for_each_pixel(in.labels, blob.box, blob.label,
+                 [&](int x, int y) { in.labels.at(x, y) = static_cast<std::uint16_t>(first + segment.at(x, y)); });
   for (int k = 0; k < segments; ++k) {
     const Blob part = measure_region(in.labels, blob.box, static_cast<std::uint16_t>(first + k));
     if (part.area > 0) split_by_claims(in, part, blob.label);

@@ -93,8 +93,8 @@ class Detector {
     double scatter;       ///< median absolute deviation [px]
     double reach;         ///< nine tenths of its pixels are this near the median [px]
     Appearance appearance;
-    std::uint16_t root;   ///< used while merging: index of the candidate that this one goes to
-    Rect united;          ///< and the box of all that go to this one
+    std::uint16_t root;  ///< used while merging: index of the candidate that this one goes to
+    Rect united;         ///< and the box of all that go to this one
   };
 
   /// Faults: kBadConfig, kBadSize, kOutOfMemory.

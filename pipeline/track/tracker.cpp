@@ -61,6 +61,7 @@ constexpr double kHiddenPart = 0.6;
 constexpr double kHiddenRate = 0.01;
 constexpr double kLooksRate = 0.05;
 constexpr double kMostLooksRate = 0.3;
+constexpr double kItself = 0.6;     // part of the looks that must be known already
 constexpr double kBlindMargin = 4;  // [px]
 // A target that comes straight on hardly moves in the picture: this change of distance shows it.
 constexpr double kApproachPart = 0.05;
@@ -143,9 +144,9 @@ std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uin
 }
 
 // Where the target's centre is, seen through this detection, along one axis. A detection that ends inside the picture
-// on one side only shows that edge; the other lies outside. Else one that is smaller than the target shows a part of it,
-// and one that is larger has something added to it: the centre is known up to half the difference, and within that it is
-// where it was expected.
+// on one side only shows that edge; the other lies outside. Else one that is smaller than the target shows a part of
+// it, and one that is larger has something added to it: the centre is known up to half the difference, and within that
+// it is where it was expected.
 double Tracker::centre_along(double expected, double size, int from, int to, int end) noexcept {
   const double extent = std::max<double>(size, to - from);
   const bool cut_before = from <= 0;
@@ -191,9 +192,9 @@ double Tracker::cost(const Target& target, const Detection& detection) const noe
     const double expected = view_.focal_baseline / z_predicted;
     const double expected_variance = square(expected / z_predicted) * target.space.position_covariance()(2, 2);
     const double step_d = expected / z_predicted * target.space.velocity().z() * dt_ * 0.5;
-    in_depth = square(detection.disparity - expected) /
-               (expected_variance + square(detection.disparity_sd) + square(step_d) +
-                square(0.5 * detection.disparity_reach) + 0.25);
+    in_depth =
+        square(detection.disparity - expected) / (expected_variance + square(detection.disparity_sd) + square(step_d) +
+                                                  square(0.5 * detection.disparity_reach) + 0.25);
     if (!(in_depth <= limit)) return Assignment::kForbidden;
   }
   const double ratio = detection.area > target.area ? detection.area / target.area : target.area / detection.area;
@@ -264,7 +265,8 @@ double Tracker::recovery_cost(const Target& target, const Detection& detection) 
       return Assignment::kForbidden;
     }
   }
-  const double step = std::sqrt(square(detection.centre_x() - target.last_x) + square(detection.centre_y() - target.last_y));
+  const double step =
+      std::sqrt(square(detection.centre_x() - target.last_x) + square(detection.centre_y() - target.last_y));
   const double reach = kRecoverReach * std::max(target.width, target.height) +
                        target.image.velocity().norm() * std::min(target.unseen_s, kClaimsFor);
   return step <= reach ? step / reach + strange / kRecoverStrange : Assignment::kForbidden;
@@ -339,9 +341,11 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   // What comes into view is learnt as it comes; what leaves is not forgotten.
   const bool cut = sides_touched(detection.box, view_.width, view_.height) != 0;
   const double grown = (detection.area - known_area) / std::max(detection.area, 1);
+  const bool itself =
+      target.appearance.explains(detection.appearance, detection.area / std::max(known_area, 1.0)) >= kItself;
   if (target.hits < 5) {
     target.appearance.learn(detection.appearance, rate);
-  } else if (detection.whole && (!cut || grown > kLooksRate)) {
+  } else if (detection.whole && itself && (!cut || grown > kLooksRate)) {
     target.appearance.learn(detection.appearance, std::clamp(grown, kLooksRate, kMostLooksRate));
   }
   target.evidence += detection.strength;
@@ -352,8 +356,8 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   target.last_y = z.y();
   target.box = detection.box;
   target.hull = detection.hull;
-  if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits && target.evidence >= config_.confirm_evidence &&
-      got_somewhere(target)) {
+  if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits &&
+      target.evidence >= config_.confirm_evidence && got_somewhere(target)) {
     target.state = TrackState::kConfirmed;
   } else if (target.state == TrackState::kCoasting) {
     target.state = TrackState::kConfirmed;

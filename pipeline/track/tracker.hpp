@@ -99,7 +99,7 @@ class Tracker {
     double twin_dy;
     double twin_from_x;  // and where it was
     double twin_from_y;
-    int whole_hits;       // detections that were regions of their own
+    int whole_hits;  // detections that were regions of their own
     int misses_in_a_row;
     int frames;
     double age_s;
