@@ -81,6 +81,8 @@ std::vector<Key> keys_of(Configuration& c) {
 
       key("foreground.low_sd", p.foreground.low_sd, 0.5, 60, "sd",
           "Distance from the background from which a pixel may belong to an object."),
+      key("foreground.faint_sd", p.foreground.faint_sd, 0.5, 60, "sd",
+          "And the same, as the mean of 5x5 pixels: large faint parts of an object."),
       key("foreground.high_sd", p.foreground.high_sd, 0.5, 60, "sd",
           "Distance that some pixels of an object must reach."),
       key("foreground.halo_percent", p.foreground.halo_percent, 0, 90, "%",
@@ -162,6 +164,8 @@ std::vector<Key> keys_of(Configuration& c) {
           "Farthest from its prediction that a feature is searched."),
 
       key("track.confirm_hits", p.track.confirm_hits, 1, 20, "frames", "Detections that confirm a target."),
+      key("track.confirm_evidence", p.track.confirm_evidence, 0, 20, "",
+          "And the sum of the detections' strengths, 0 to 1 each, that it takes: weak ones need more frames."),
       key("track.tentative_misses", p.track.tentative_misses, 1, 10, "frames",
           "Frames without detection that remove an unconfirmed target."),
       key("track.coast_s", p.track.coast_s, 0, 60, "s", "How long a confirmed target lives on its prediction."),

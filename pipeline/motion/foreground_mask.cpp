@@ -18,7 +18,8 @@ constexpr int kMaxComponents = 4096;
 
 Result<ForegroundMask> ForegroundMask::create(const Config& config, int width, int height, Arena& arena) noexcept {
   if (!(config.low_sd > 0) || !(config.high_sd >= config.low_sd) || !(config.high_sd <= 60) ||
-      config.halo_percent < 0 || config.halo_percent > 90 || config.min_seeds < 1) {
+      !(config.faint_sd >= 0.5) || !(config.faint_sd <= 60) || config.halo_percent < 0 || config.halo_percent > 90 ||
+      config.min_seeds < 1) {
     return fail(Fault::kBadConfig);
   }
   Result<BlobExtractor> components =

@@ -8,9 +8,10 @@ namespace stereotrack {
 
 /// What a region looks like, wherever it is: the histogram of its colours.
 ///
-/// 8 x 8 x 8 bins of Y, Cb, Cr; chroma is dense around grey, so its bins cover 128 +- 48 and the outer ones take what
-/// lies beyond. Each pixel counts half in its bin and half in the next nearer one along Y, so that a slight change of
-/// light moves little. Grey sources (Cb = Cr = 128) use the eight bins of Y alone. A value; integers until normalised.
+/// 8 x 8 x 8 bins of Y, Cb, Cr; chroma is dense around grey, so its bins of 12 cover 74..169, grey in the middle
+/// of one, and the outer ones take what lies beyond. Each pixel counts half in its bin and half in the next nearer one
+/// along Y, so that a slight change of light moves little. Grey sources (Cb = Cr = 128) use the eight bins of Y alone.
+/// A value; integers until normalised.
 class Appearance {
  public:
   static constexpr int kBins = 512;
@@ -58,7 +59,7 @@ class Appearance {
   }
 
  private:
-  static constexpr int chroma_bin(std::uint8_t c) noexcept { return std::clamp((c - 80) / 12, 0, 7); }
+  static constexpr int chroma_bin(std::uint8_t c) noexcept { return std::clamp((c - 74) / 12, 0, 7); }
 
   std::array<float, kBins> share_{};
   float total_ = 0;

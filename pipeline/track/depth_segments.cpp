@@ -23,7 +23,7 @@ constexpr double kSmallKnown = 0.6;
 
 Result<DepthSegments> DepthSegments::create(const Config& config, int width, int height, Arena& arena) noexcept {
   if (!(config.jump > 0) || !(config.jump_px > 0) || config.min_px < 1 || !(config.min_part >= 0) ||
-      !(config.min_part <= 0.5)) {
+      !(config.min_known >= 0) || !(config.min_part <= 0.5)) {
     return fail(Fault::kBadConfig);
   }
   if (width < 1 || height < 1 || width > 8192 || height > 8192) return fail(Fault::kBadSize);
@@ -82,13 +82,16 @@ int DepthSegments::flood(const Input& in, const Blob& blob, int least) noexcept 
       const Place p = queue_[first];
       const int here = filled_.at(p.x, p.y);
       known += in.disparity.at(p.x, p.y) != kNoDisparity ? 1U : 0U;
-      const int jump = static_cast<int>(std::max(config_.jump_px * kDisparityScale, config_.jump * here));
       constexpr std::array<std::array<int, 2>, 4> kSteps{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
       for (const auto& [dx, dy] : kSteps) {
         const int x = p.x + dx;
         const int y = p.y + dy;
         if (!in.labels.contains(x, y) || in.labels.at(x, y) != blob.label || segment_.at(x, y) != kUnseen) continue;
-        if (std::abs(filled_.at(x, y) - here) > jump) continue;
+        const int there = filled_.at(x, y);
+        if (std::abs(there - here) >
+            std::max(config_.jump_px * kDisparityScale, config_.jump * std::max(here, there))) {
+          continue;
+        }
         segment_.at(x, y) = static_cast<std::uint16_t>(found);
         queue_[last++] = {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
       }

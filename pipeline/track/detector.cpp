@@ -199,7 +199,8 @@ void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, st
 
 void Detector::split(const Input& in, const Blob& blob) noexcept {
   if (blob.area == 0) return;
-  const int segments = in.disparity.empty() ? 1 : segments_.run({in.labels, in.disparity, in.y}, blob);
+  const bool room = !candidates_.full() && !in.disparity.empty();
+  const int segments = !room ? 1 : segments_.run({in.labels, in.disparity, in.y}, blob);
   if (segments == 1) {
     split_by_claims(in, blob, blob.label);
     return;
@@ -220,7 +221,7 @@ void Detector::split_by_claims(const Input& in, const Blob& segment, std::uint16
   layers_.clear();
   layers_from_claims(in, segment);
   if (layers_.size() >= 2) drop_weak_claims(in, segment);
-  if (layers_.size() < 2) {
+  if (layers_.size() < 2 || candidates_.full()) {
     add_candidate(segment.label, segment.box, -1, blob, true);
     return;
   }

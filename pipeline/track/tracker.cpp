@@ -80,8 +80,8 @@ Matrix2 centre_noise(const Tracker::Config& config, const Rect& box) noexcept {
 Result<Tracker> Tracker::create(const Config& config, const Features::Config& features, const View& view,
                                 Arena& arena) noexcept {
   if (config.confirm_hits < 1 || config.confirm_hits > 20 || config.tentative_misses < 1 || !(config.coast_s >= 0) ||
-      !(config.gate > 0) || !(config.acceleration > 0) || !(config.initial_speed > 0) ||
-      !(config.centre_noise_px > 0) || !(config.centre_noise_size >= 0)) {
+      !(config.confirm_evidence >= 0) || !(config.gate > 0) || !(config.acceleration > 0) ||
+      !(config.initial_speed > 0) || !(config.centre_noise_px > 0) || !(config.centre_noise_size >= 0)) {
     return fail(Fault::kBadConfig);
   }
   if (view.width < 1 || view.height < 1 || !(view.focal > 0) || !(view.focal_baseline >= 0)) {
@@ -427,7 +427,8 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
                        config_.initial_speed * detection.position.z());
     target.has_depth = true;
   }
-  if (config_.confirm_hits == 1 && config_.travel_px <= 0) target.state = TrackState::kConfirmed;
+  if (config_.confirm_hits == 1 && config_.travel_px <= 0 && target.evidence >= config_.confirm_evidence)
+    target.state = TrackState::kConfirmed;
   if (targets_.push(target)) {
     ++next_id_;
   } else {

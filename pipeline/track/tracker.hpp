@@ -45,7 +45,7 @@ class Tracker {
 
   struct Config {
     int confirm_hits = 3;             ///< detections that confirm a target, 1..20
-    double confirm_evidence = 2;      ///< and the sum of their strengths (Detection::strength, 0..1), 0..20
+    double confirm_evidence = 1.5;    ///< and the sum of their strengths (Detection::strength, 0..1), 0..20
     int tentative_misses = 2;         ///< frames without detection that remove a tentative target, 1..10
     double coast_s = 1.5;             ///< how long a confirmed target lives without detections [s], 0..60
     double gate = 4.0;                ///< association gate [standard deviations], 1..10
