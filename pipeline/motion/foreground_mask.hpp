@@ -11,7 +11,9 @@
 namespace stereotrack {
 
 /// Foreground of the robust preset: from the distance to the background (AdaptiveBackground) to a mask.
-/// 1. a pixel is a candidate from `low` on, a seed from `high` on;
+/// 1. a pixel is a candidate from `low` on, a seed from `high` on; one below `low` is a candidate, too, if the mean
+/// over
+///    5x5 reaches `faint` and half of the largest distance within 2 px: large parts that differ little;
 /// 2. halo: smoothing and blur spread a strong object over its rim. A candidate under halo_percent of the
 ///    largest distance within 2 px is rim, not object;
 /// 3. a pixel stays if most of its 3x3 neighbourhood are candidates, which removes single noisy pixels;

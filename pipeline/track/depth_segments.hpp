@@ -17,7 +17,8 @@ namespace stereotrack {
 ///    costs 1 + |change of luma| / 4: flat surfaces are filled from their textured rims, and not across an edge.
 /// 2. 4-neighbours hang together if their disparities differ by at most max(jump_px, jump d).
 /// 3. A component with fewer than min_part of the blob's pixels (or than min_px), or of which less than min_known was
-///    measured rather than filled, is no evidence: its pixels go to the nearest other one, by the same path.
+///    measured rather than filled (0.6 for those under 5 % of the blob), is no evidence: its pixels go to the nearest
+///    other one, by the same path.
 /// A blob without any disparity is one segment without depth.
 ///
 /// disparity in 1/16 px, kNoDisparity where unknown, same picture as labels. Two sweeps over the blob's box in each

@@ -35,15 +35,19 @@ using RejectionCounts = std::array<std::uint32_t, kRejections>;
 
 /// Blobs and depth -> detections: candidates are split, merged and rejected.
 ///
-/// Split: where two or more confirmed targets, each seen on its own before, are expected in one blob, each pixel
-/// goes to the target that explains it best,
-///     cost = ((x - x_t) / w_t)^2 + ((y - y_t) / h_t)^2 + ((d - d_t) / s_t)^2,
-/// else a blob whose disparities form layers with a gap of split_depth between them is split into the layers.
-/// Merge: pieces that are close in the picture (merge_gap; twice that, of the whole target's size, for pieces that one
-/// confirmed target explains) and in depth (merge_depth), and not claimed by different targets, are one object. So are
-/// two confirmed targets one above the other, at one depth and of one motion: an object that had come apart. Depth of a
-/// piece: median of its disparities; its scatter is the median absolute deviation; its position the mean of its pixels'
-/// points (pixels without disparity take the median).
+/// Split: a blob falls into segments of continuous depth (DepthSegments). Where two or more confirmed targets at one
+/// depth, each seen on its own before, are expected in one segment, each pixel goes to the target that explains it
+/// best,
+///     cost = ((x - x_t) / w_t)^2 + ((y - y_t) / h_t)^2 + min(((d - d_t) / s_t)^2, 16) + 4 q / (p_t(colour) + q),
+/// p_t the part that the pixel's colour has in the target's Appearance, q = 0.02.
+/// Claim: a piece belongs to the confirmed target in whose expected box it lies, if depth and looks allow: a piece may
+/// be somewhat nearer or farther than the target or look somewhat different, not both. Merge: pieces that are close in
+/// the picture (merge_gap; twice that, of the whole target's size, for pieces that one confirmed target claims and that
+/// together do not outgrow it) and in depth (merge_depth; split_depth for pieces of one blob that no target claims),
+/// and not claimed by different targets, are one object. So are two confirmed targets one above the other, at one depth
+/// and of one motion, that were never far apart: an object that had come apart. Depth of a piece: median of its
+/// disparities; its scatter is the median absolute deviation; its position the mean of its pixels' points (pixels
+/// without disparity take the median).
 ///
 /// Raw left picture throughout; `disparity` is given there too. One instance a thread.
 /// O(pixels of the blobs x claims).

@@ -21,21 +21,29 @@ namespace stereotrack {
 /// picture, which always runs, and one of its position in space, which runs while stereo sees it. Times come
 /// from the frames' capture times.
 ///
-/// Association: squared Mahalanobis distance in the picture, in disparity, and of size and colour, added and
-/// solved as one assignment problem; confirmed targets first, tentative ones among what is left. The gate has
-/// room for one missing frame: the distance covered in one step counts as uncertainty along the motion.
+/// Place: a detection smaller than the target shows a part of it, a larger one has something added to it; the centre is
+/// then known up to half the difference of sizes, and within that it is where it was expected. At the border of the
+/// picture the edge that is seen tells. Sizes grow quickly and shrink slowly, hardly at all while half is hidden.
+///
+/// Association: squared Mahalanobis distance in the picture, in disparity, and of size and looks (Appearance), added
+/// and solved as one assignment problem; confirmed targets first, tentative ones among what is left. The gate has room
+/// for one missing frame: the distance covered in one step counts as uncertainty along the motion.
+///
+/// Recovery: a confirmed target without detection takes a detection without target near where it was last seen, if
+/// depth, size and looks agree: it has bounced, or comes out from behind something. Its motion starts anew.
 ///
 /// Features: each target carries corners of its surface, searched in the window that their own filters predict
 /// (features.hpp). Those found vote for the detection in whose box they lie.
 ///
-/// Life: a detection without a target starts a tentative one. It is confirmed by confirm_hits detections if it
-/// has got somewhere meanwhile: at least travel_px in the picture and straight_part of the path it took (flicker
-/// jumps to and fro), or a twentieth of its distance. tentative_misses frames in a row without detection remove it. A
-/// confirmed target without detection coasts on its prediction for coast_s, but no longer than 0.2 s and half the time
-/// for which it was seen, or until it left the picture.
+/// Life: a detection without a target starts a tentative one. It is confirmed by confirm_hits detections whose
+/// strengths add up to confirm_evidence, if it has got somewhere meanwhile: at least travel_px in the picture and
+/// straight_part of the path it took (flicker jumps to and fro), or a twentieth of its distance. tentative_misses
+/// frames in a row without detection remove it. A confirmed target without detection coasts on its prediction for
+/// coast_s, but no longer than 0.2 s and half the time for which it was seen, or until it left the picture.
 ///
-/// Twins: an object that came into view in pieces has a target for each. Two that share one region for kTwinFrames, at
-/// one depth and of one motion, are one object: the smaller goes.
+/// Twins: an object that came into view in pieces has a target for each. Two that stay close together, at one depth and
+/// without a change of their places, while they move by a size (10 frames; 30 for what stands still) are one object:
+/// the smaller goes.
 ///
 /// One thread. O(tracks x detections), no allocation after create().
 class Tracker {

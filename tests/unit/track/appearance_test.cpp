@@ -47,6 +47,13 @@ TEST(Appearance, PixelCountsHalfInItsBinAndHalfInTheNextNearerOne) {
   EXPECT_EQ(one.share(31, 128, 128), 0);
 }
 
+TEST(Appearance, GreyStaysGreyUnderASlightTint) {
+  for (const int tint : {-6, -2, 2, 5}) {
+    const auto c = static_cast<std::uint8_t>(128 + tint);
+    EXPECT_DOUBLE_EQ(of({100, 128, 128}).explains(of({100, c, c})), 1) << tint;
+  }
+}
+
 TEST(Appearance, ExplainsItselfAndNoStranger) {
   Appearance mixed = of(kBlack, 30);
   paint(mixed, kRed, 50);
@@ -114,7 +121,9 @@ TEST(Appearance, SlightChangeOfLightMovesLittle) {
   for (int y = 0; y < 248; ++y) {
     const Appearance before = of({static_cast<std::uint8_t>(y), 128, 128});
     EXPECT_GE(before.explains(of({static_cast<std::uint8_t>(y + 8), 128, 128})), 0.5 - 1e-6) << y;
-    if (y < 160) EXPECT_EQ(before.explains(of({static_cast<std::uint8_t>(y + 96), 128, 128})), 0) << y;
+    if (y < 160) {
+      EXPECT_EQ(before.explains(of({static_cast<std::uint8_t>(y + 96), 128, 128})), 0) << y;
+    }
   }
 }
 
