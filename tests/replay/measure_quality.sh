@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Measures the figures of docs/QUALITY.md and prints its tables (Markdown).
 #   tests/replay/measure_quality.sh BUILD_DIR [DATA_DIR [SECTION...]]
-# SECTION: conveyor people baseball eleven middlebury highway; all without one. SEEDS="1" for fewer of eleven.
+# SECTION: conveyor people baseball eleven middlebury highway; all without one. SEEDS="1" for fewer.
 set -euo pipefail
 
 die() {
