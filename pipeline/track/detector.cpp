@@ -288,14 +288,12 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
   }
   candidate.scatter = (static_cast<double>(reach) + 0.25) * kBin / kDisparityScale;
   const auto most = static_cast<std::uint32_t>(candidate.valid * 9LL / 10);
-  const std::size_t middle = reach;
   while (inside < most) {
     ++reach;
     if (bin >= reach) inside += histogram_[bin - reach];
     if (bin + reach < kBins) inside += histogram_[bin + reach];
   }
   candidate.reach = (static_cast<double>(reach) + 0.25) * kBin / kDisparityScale;
-  reach = middle;
   // A block's disparities hang together: about one independent value every 5 x 5 pixels.
   const double independent = std::max(candidate.valid / 25.0, 1.0);
   candidate.disparity_sd = std::sqrt(square(kLeastDisparitySd) + square(1.5 * candidate.scatter) / independent);
