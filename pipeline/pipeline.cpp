@@ -43,42 +43,23 @@ void fill(ImageView<T> picture, const Rect& part, T value) noexcept {
   for (int y = part.top; y < part.bottom(); ++y) std::fill_n(picture.row(y) + part.left, part.width, value);
 }
 
-// Short stretches of a row without disparity, between ends that agree, take the straight line between them: a
-// background is mostly made of planes.
-void bridge_gaps(std::uint16_t* row, int width) noexcept {
+// Short stretches of a row or column (`step` apart) without disparity, between ends that agree, take the straight line
+// between them: a background is mostly made of planes.
+void bridge_gaps(std::uint16_t* first, std::ptrdiff_t step, int count, int widest) noexcept {
   int last = -1;
-  for (int x = 0; x < width; ++x) {
-    if (row[x] == kNoDisparity) continue;
-    const int gap = x - last;
-    if (last >= 0 && gap > 1 && gap <= kWidestGap) {
-      const int from = row[last];
-      const int to = row[x];
+  for (int i = 0; i < count; ++i) {
+    if (first[i * step] == kNoDisparity) continue;
+    const int gap = i - last;
+    if (last >= 0 && gap > 1 && gap <= widest) {
+      const int from = first[last * step];
+      const int to = first[i * step];
       if (std::abs(to - from) <= std::max(2 * kDisparityScale, from / 10)) {
-        for (int u = last + 1; u < x; ++u) row[u] = static_cast<std::uint16_t>(from + (to - from) * (u - last) / gap);
-      }
-    }
-    last = x;
-  }
-}
-
-// The same along the columns, for rows top..bottom: a line along the rows has no disparity of its own.
-void bridge_columns(ImageView<std::uint16_t> map, int top, int bottom) noexcept {
-  const int first = std::max(top - kWidestColumnGap, 0);
-  for (int x = 0; x < map.width; ++x) {
-    int last = -1;
-    for (int y = first; y < bottom; ++y) {
-      if (map.at(x, y) == kNoDisparity) continue;
-      if (last >= 0 && y - last > 1 && y - last <= kWidestColumnGap) {
-        const int from = map.at(x, last);
-        const int to = map.at(x, y);
-        if (std::abs(to - from) <= std::max(2 * kDisparityScale, from / 10)) {
-          for (int v = last + 1; v < y; ++v) {
-            map.at(x, v) = static_cast<std::uint16_t>(from + (to - from) * (v - last) / (y - last));
-          }
+        for (int k = last + 1; k < i; ++k) {
+          first[k * step] = static_cast<std::uint16_t>(from + (to - from) * (k - last) / gap);
         }
       }
-      last = y;
     }
+    last = i;
   }
 }
 
@@ -458,8 +439,12 @@ void Pipeline::renew_background_disparity() noexcept {
   }
   fill(canvas_background_, strip, kNoDisparity);
   run_matcher(left_.background_canvas, right_.background_canvas, strip, {0, full_range_}, canvas_background_);
-  for (int y = strip.top; y < strip.bottom(); ++y) bridge_gaps(canvas_background_.row(y), strip.width);
-  bridge_columns(canvas_background_, strip.top, strip.bottom());
+  for (int y = strip.top; y < strip.bottom(); ++y) bridge_gaps(canvas_background_.row(y), 1, strip.width, kWidestGap);
+  // A line along the rows has no disparity of its own: it is bridged along the columns.
+  const int from = std::max(strip.top - kWidestColumnGap, 0);
+  for (int x = 0; x < strip.width; ++x) {
+    bridge_gaps(&canvas_background_.at(x, from), canvas_background_.stride, strip.bottom() - from, kWidestColumnGap);
+  }
   renewed_rows_ += strip.height;
 }
 
@@ -470,13 +455,8 @@ void Pipeline::match_blob(const Blob& blob) noexcept {
     fill(canvas_disparity_, roi, kNoDisparity);
     run_matcher(left_.canvas, right_.canvas, roi, range_for(blob), canvas_disparity_);
   }
-  take_disparity(blob.box, blob.label);
-}
-
-// From the canvas to the raw picture: the disparity of a region, and that of the background behind it.
-void Pipeline::take_disparity(const Rect& box, std::uint16_t label) noexcept {
   const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
-  for_each_pixel(blobs_.labels, box, label, [&](int x, int y) {
+  for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
     const Rectifier::PointF p = place.at(x, y);
     const int u = static_cast<int>(std::floor(p.x + 0.5F));
     const int v = static_cast<int>(std::floor(p.y + 0.5F));
@@ -517,6 +497,7 @@ ShadowTest::Input Pipeline::shadow_input() const noexcept {
 }
 
 void Pipeline::measure_strength() noexcept {
+  const ShadowTest::Input in = shadow_input();
   for (const Blob& blob : blobs_.blobs) {
     std::array<std::int32_t, 256> histogram{};
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { ++histogram[left_.distance.at(x, y)]; });
@@ -528,8 +509,7 @@ void Pipeline::measure_strength() noexcept {
     }
     typical_distance_[blob.label] = static_cast<std::uint8_t>(level);
     ShadowTest::Evidence sum;
-    for_each_pixel(blobs_.labels, blob.box, blob.label,
-                   [&](int x, int y) { shadow_test_->weigh(shadow_input(), x, y, sum); });
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { shadow_test_->weigh(in, x, y, sum); });
     ghost_[blob.label] = sum.behind > sum.near ? 1 : 0;
   }
 }

@@ -115,7 +115,6 @@ class Pipeline {
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;
-  void take_disparity(const Rect& box, std::uint16_t label) noexcept;
   void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
   [[nodiscard]] bool fits_at(double disparity, const Rect& roi, int area) noexcept;
   void learn_background() noexcept;

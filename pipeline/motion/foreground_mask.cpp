@@ -61,7 +61,7 @@ Result<double> ForegroundMask::run(ImageView<const std::uint8_t> distance, Image
       const int here = distance.at(x, y);
       int sum = 0;
       int count = 0;
-      if (here < low_) {
+      if (here < low_ && most >= faint_) {
         for (int v = std::max(y - 2, 0); v <= std::min(y + 2, height - 1); ++v) {
           for (int u = std::max(x - 2, 0); u <= std::min(x + 2, width - 1); ++u) {
             sum += distance.at(u, v);

@@ -80,13 +80,14 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
   Candidate whole{};
   whole.label = blob.label;
   whole.box = blob.box;
-  measure(in, whole);
   for (std::size_t k = 0; k < in.predictions.size() && layers_.size() < layers_.capacity(); ++k) {
     const Prediction& target = in.predictions[k];
     if (!target.confirmed || !target.independent) continue;
     const Rect expected = intersect(target.box, {0, 0, width_, height_});
     const Rect common = intersect(expected, blob.box);
-    if (common.empty() || depth_apart(target, whole, 1) > 1) continue;
+    if (common.empty()) continue;
+    if (whole.area == 0) measure(in, whole);
+    if (depth_apart(target, whole, 1) > 1) continue;
     int covered = 0;
     int matching = 0;
     int known = 0;
@@ -108,7 +109,6 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
     layer.y = target.box.top + (target.box.height - 1) * 0.5;
     layer.half_width = 0.5 * target.box.width + target.image_sd;
     layer.half_height = 0.5 * target.box.height + target.image_sd;
-    layer.has_place = true;
     layer.has_depth = target.has_depth;
     layer.disparity = target.disparity;
     layer.disparity_sd = target.disparity_sd + config_.match_noise_px + 0.25 * config_.split_depth * target.disparity;
@@ -167,8 +167,7 @@ std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
   double least = 1e300;
   for (std::size_t k = 0; k < layers_.size(); ++k) {
     const Layer& layer = layers_[k];
-    double cost = 0;
-    if (layer.has_place) cost += square((x - layer.x) / layer.half_width) + square((y - layer.y) / layer.half_height);
+    double cost = square((x - layer.x) / layer.half_width) + square((y - layer.y) / layer.half_height);
     if (layer.has_depth && raw != kNoDisparity) {
       const double apart = raw / static_cast<double>(kDisparityScale) - layer.disparity;
       cost += std::min(square(apart / layer.disparity_sd), kMostDepthCost);
@@ -405,7 +404,7 @@ void Detector::merge(const Input& in) noexcept {
     if (root == i || candidates_[i].area == 0) continue;
     relabel_region(in.labels, candidates_[i].box, candidates_[i].label, candidates_[root].label);
     candidates_[root].whole = candidates_[root].whole && candidates_[i].whole;
-    candidates_[root].box = unite(candidates_[root].box, candidates_[i].box);
+    candidates_[root].box = candidates_[root].united;
     if (candidates_[root].claim < 0) candidates_[root].claim = candidates_[i].claim;
     candidates_[i].area = 0;
   }

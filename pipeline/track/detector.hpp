@@ -87,7 +87,7 @@ class Detector {
     std::uint16_t blob;   ///< label of the blob it was cut from
     Rect box;             ///< [px]
     int area;             ///< [px]
-    bool whole;           ///< not cut out of a larger blob
+    bool whole;           ///< no target shares its segment of depth
     int claim;            ///< index of the confirmed prediction that explains it, -1 = none
     int valid;            ///< pixels with a disparity of their own
     bool has_depth;       ///< disparity and disparity_sd are known
@@ -120,7 +120,7 @@ class Detector {
     double disparity, disparity_sd;
     const Appearance* appearance;
     double fit;
-    bool has_place, has_depth;
+    bool has_depth;
     int claim;
   };
 

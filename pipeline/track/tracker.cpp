@@ -32,7 +32,7 @@ constexpr double kCoastAnyway = 0.2;
 constexpr double kCoastPart = 0.5;
 // A target of which less than this part would still be in the picture has left.
 constexpr double kVisiblePart = 0.5;
-// Twins: frames, difference of distance and of speed as fractions, and sway of pieces [sizes/s].
+// Twins: frames, difference of distance as a fraction, drift of their places, way together and gaps [sizes].
 constexpr int kTwinFrames = 10;
 constexpr double kTwinDepth = 0.04;
 constexpr double kTwinDrift = 0.25;
