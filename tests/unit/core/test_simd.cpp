@@ -1,0 +1,40 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "pipeline/core/simd.hpp"
+
+namespace stereotrack {
+namespace {
+
+TEST(Simd, ScalarIsAlwaysThereAndFirst) {
+  ASSERT_FALSE(simd_targets().empty());
+  EXPECT_EQ(simd_targets().front(), SimdTarget::kScalar);
+  EXPECT_TRUE(std::is_sorted(simd_targets().begin(), simd_targets().end()));
+}
+
+TEST(Simd, TheBestIsUsedUntilToldOtherwise) { EXPECT_EQ(simd_in_use(), simd_targets().back()); }
+
+TEST(Simd, EachAvailableTargetCanBeForced) {
+  for (const SimdTarget target : simd_targets()) {
+    ASSERT_TRUE(use_simd(target)) << to_string(target);
+    EXPECT_EQ(simd_in_use(), target);
+  }
+}
+
+TEST(Simd, AnotherMachinesTargetIsRefused) {
+  const auto targets = simd_targets();
+  const SimdTarget before = simd_in_use();
+  int refused = 0;
+  for (std::size_t i = 0; i < kSimdTargets; ++i) {
+    const auto target = static_cast<SimdTarget>(i);
+    if (std::find(targets.begin(), targets.end(), target) != targets.end()) continue;
+    EXPECT_FALSE(use_simd(target)) << to_string(target);
+    EXPECT_EQ(simd_in_use(), before);
+    ++refused;
+  }
+  EXPECT_GE(refused, 1);  // no machine is both x86 and ARM
+}
+
+}  // namespace
+}  // namespace stereotrack
