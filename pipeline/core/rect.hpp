@@ -45,6 +45,13 @@ struct Rect {
   return {left, top, std::max(a.right(), b.right()) - left, std::max(a.bottom(), b.bottom()) - top};
 }
 
+/// Columns or rows between two boxes, the larger of both; 0 if they touch [px].
+[[nodiscard]] inline int gap(const Rect& a, const Rect& b) noexcept {
+  const int across = std::max({a.left - b.right(), b.left - a.right(), 0});
+  const int down = std::max({a.top - b.bottom(), b.top - a.bottom(), 0});
+  return std::max(across, down);
+}
+
 /// Intersection over union of two boxes, 0..1.
 [[nodiscard]] inline double overlap(const Rect& a, const Rect& b) noexcept {
   const auto common = static_cast<double>(intersect(a, b).area());

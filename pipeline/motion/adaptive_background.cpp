@@ -14,8 +14,9 @@ constexpr int kPriorFrames = 8;
 // Grid of the gain estimate and its histogram: ratios 1/4 .. 4 around 256.
 constexpr int kGainStep = 3;
 constexpr int kGainBins = 1024;
-constexpr int kGainDarkest = 20 * 256;     // below, the ratio is mostly noise [8.8]
-constexpr int kGainBrightest = 250 * 256;  // above, the picture is clipped
+constexpr int kGainDarkest = 20 * 256;  // below, the ratio is mostly noise [8.8]
+// From here on a pixel is clipped: it says no more than that it is at least so bright [8.8].
+constexpr int kClipped = 250 * 256;
 // How far a pixel may be from its candidate and still be the same look [8.8].
 constexpr int kCandidateReach = 12 * 256;
 
@@ -61,8 +62,7 @@ int AdaptiveBackground::estimate_gain(ImageView<const std::uint8_t> y) const noe
     for (int u = 0; u < y.width; u += kGainStep) {
       const int background = y_.mean.at(u, v);
       const int now = y.at(u, v);
-      if (background < kGainDarkest || background > kGainBrightest || now < 4 || now > 250 ||
-          foreground_.at(u, v) != 0) {
+      if (background < kGainDarkest || background > kClipped || now < 4 || now > 250 || foreground_.at(u, v) != 0) {
         continue;
       }
       ++histogram[static_cast<std::size_t>(std::min((now * 65536 + background / 2) / background, kGainBins - 1))];
@@ -120,7 +120,10 @@ void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t>
     std::uint8_t* result = out.row(y);
     for (int x = 0; x < width; ++x) {
       const int tolerance = range_.at(x, y) * config_.edge_percent * 256 / 100;
-      const int apart = std::abs((picture.y.at(x, y) << 8) - ((y_.mean.at(x, y) * gain_) >> 8));
+      const int now = picture.y.at(x, y) << 8;
+      const int expected = (y_.mean.at(x, y) * gain_) >> 8;
+      const bool clipped = std::max<int>(y_.mean.at(x, y), expected) >= kClipped;
+      const int apart = std::max(std::min(expected, kClipped) - now, now - (clipped ? 255 << 8 : expected));
       const int noise = y_.deviation.at(x, y) * 5 / 4 + config_.noise_floor;
       const int luma = std::max(apart - tolerance, 0) * kStepsPerSd / noise;
       int colour = 0;

@@ -24,7 +24,9 @@ namespace stereotrack {
 ///     z = 4 max(0, |x - g m| - e R) / (1.25 a + floor)
 /// g: gain of the light (median ratio of picture and background over the pixels not lately foreground), so
 /// that exposure drift is no motion; R: range of m in the 3x3 neighbourhood, so that an edge which moves by
-/// a fraction e of a pixel is no motion either. Channels combine as max + half the smaller.
+/// a fraction e of a pixel is no motion either. A clipped pixel
+/// (g m or m from 250 on) stands for all that is at least as bright as min(g m, 250). Channels combine as max + half
+/// the smaller.
 ///
 /// The pictures given should be smoothed a little (3x3): then a is the noise that remains.
 /// Integers only (8.8 fixed point). One instance a view; one thread; O(pixels).

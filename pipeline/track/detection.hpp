@@ -21,12 +21,20 @@ struct Detection {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
   Appearance appearance;  ///< over its mask
-  bool whole = true;      ///< not cut out of a larger region
+  bool whole = true;      ///< no target shares its segment of depth
+  int region = 0;         ///< connected region of the foreground of which it is a part, 0 = its own alone
   double strength = 0;    ///< 0..1, how far above the foreground threshold it stands
 
   [[nodiscard]] double centre_x() const noexcept { return box.left + (box.width - 1) * 0.5; }
   [[nodiscard]] double centre_y() const noexcept { return box.top + (box.height - 1) * 0.5; }
 };
+
+/// The right camera does not see what lies further left in the left picture than its disparity: whatever was matched
+/// there is wrong.
+[[nodiscard]] inline bool is_blind(const Rect& box, double disparity_px) noexcept {
+  constexpr double kMargin_px = 4;
+  return box.right() < disparity_px + kMargin_px;
+}
 
 /// Where the tracker expects a target in the coming frame; bounds the search of the stages before it.
 struct Prediction {

@@ -23,8 +23,6 @@ constexpr double kMostGrowth = 1.1;
 // Part of a piece's colours that a target must explain to be taken for another part of it.
 constexpr double kAlike = 0.6;
 constexpr double kUnlike = 0.5;
-// The right camera does not see what lies further left than its disparity: what is matched there is wrong.
-constexpr double kBlindMargin = 4;  // [px]
 // Part of its usual area that a target must get of a shared region.
 constexpr double kSplinterPart = 0.2;
 // A depth that does not fit counts against a pixel at most this much.
@@ -42,12 +40,6 @@ double length(double x, double y) noexcept { return std::sqrt(x * x + y * y); }
 
 bool fits_into(const Rect& whole, const Rect& box) noexcept {
   return box.width <= kMostGrowth * whole.width + 2 && box.height <= kMostGrowth * whole.height + 2;
-}
-
-int gap(const Rect& a, const Rect& b) noexcept {
-  const int across = std::max({a.left - b.right(), b.left - a.right(), 0});
-  const int down = std::max({a.top - b.bottom(), b.top - a.bottom(), 0});
-  return std::max(across, down);
 }
 
 }  // namespace
@@ -302,7 +294,7 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
 // Difference in depth, 1 = as much as a piece may be nearer or farther than the target. One that looks alike may lie as
 // far from the target's middle as its surface is known to reach.
 double Detector::depth_apart(const Prediction& target, const Candidate& candidate, double likeness) const noexcept {
-  const bool blind = candidate.box.right() < target.disparity + kBlindMargin;
+  const bool blind = is_blind(candidate.box, target.disparity);
   if (!target.has_depth || !candidate.has_depth || blind) return 0;
   const double nearer = std::max(target.disparity, candidate.disparity);
   const double usual = config_.merge_depth * nearer;
@@ -405,6 +397,10 @@ void Detector::merge(const Input& in) noexcept {
     relabel_region(in.labels, candidates_[i].box, candidates_[i].label, candidates_[root].label);
     candidates_[root].whole = candidates_[root].whole && candidates_[i].whole;
     candidates_[root].box = candidates_[root].united;
+    if (candidates_[i].area > candidates_[root].area) {
+      candidates_[root].blob = candidates_[i].blob;
+      candidates_[root].area = candidates_[i].area;
+    }
     if (candidates_[root].claim < 0) candidates_[root].claim = candidates_[i].claim;
     candidates_[i].area = 0;
   }
@@ -442,6 +438,7 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   out.box = candidate.box;
   out.area = candidate.area;
   out.whole = candidate.whole;
+  out.region = candidate.blob;
   out.appearance = candidate.appearance;
   std::uint64_t strength = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();

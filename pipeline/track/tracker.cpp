@@ -30,6 +30,8 @@ constexpr double kStranger = 2.0;
 // A target coasts this long [s], and this part of the time for which it was seen, but never over coast_s.
 constexpr double kCoastAnyway = 0.2;
 constexpr double kCoastPart = 0.5;
+// A distance is known for so long after it was measured [s].
+constexpr double kDepthLasts = 2.0;
 // A target of which less than this part would still be in the picture has left.
 constexpr double kVisiblePart = 0.5;
 // Twins: frames, difference of distance as a fraction, drift of their places, way together and gaps [sizes].
@@ -39,6 +41,7 @@ constexpr double kTwinDrift = 0.25;
 constexpr double kTwinWay = 1.0;
 constexpr double kLimbPart = 0.15;  // so small a part may swing
 constexpr int kTwinStill = 30;
+constexpr int kTrialFrames = 15;  // a part of another target's region is not confirmed for so long
 constexpr double kTwinStacked = 0.4;
 constexpr double kTwinBeside = 0.1;
 // Two that were this far from each other, in sizes or in depth, are not pieces of one object.
@@ -54,6 +57,13 @@ constexpr double kRecoverStrange = 0.25;
 constexpr double kRecoverDepth = 0.06;
 constexpr double kRecoverReach = 1.5;
 constexpr double kRecoverSpeed = 0.2;
+constexpr double kRecoverAlone = 2.0;
+// And what takes the place of one that was seen at most so many frames ago: overlap of the boxes.
+constexpr int kOverlapMisses = 1;
+constexpr double kOverlapPart = 0.4;
+constexpr double kLargePart = 0.1;  // of the picture
+// A part takes its region's target over if their boxes have this much of the smaller in common.
+constexpr double kInPlacePart = 0.5;
 // Smoothing of size and colour: a partly hidden target must not be learnt at once.
 constexpr double kAppearanceRate = 0.2;
 constexpr double kShrinkRate = 0.05;
@@ -61,8 +71,7 @@ constexpr double kHiddenPart = 0.6;
 constexpr double kHiddenRate = 0.01;
 constexpr double kLooksRate = 0.05;
 constexpr double kMostLooksRate = 0.3;
-constexpr double kItself = 0.6;     // part of the looks that must be known already
-constexpr double kBlindMargin = 4;  // [px]
+constexpr double kItself = 0.6;  // part of the looks that must be known already
 // A target that comes straight on hardly moves in the picture: this change of distance shows it.
 constexpr double kApproachPart = 0.05;
 
@@ -164,12 +173,10 @@ Vector2 Tracker::centre(const Target& target, const Detection& detection) const 
           centre_along(expected.y(), target.height, box.top, box.bottom(), view_.height)};
 }
 
-// What lies at the left border of the left picture further out than its disparity, the right camera does not see:
-// whatever was matched there is wrong.
 bool Tracker::sees_depth(const Target& target, const Detection& detection) const noexcept {
   if (!detection.has_depth) return false;
   const double z = target.space.position().z();
-  return !target.has_depth || !(z > 0) || detection.box.right() > view_.focal_baseline / z + kBlindMargin;
+  return !target.has_depth || !(z > 0) || !is_blind(detection.box, view_.focal_baseline / z);
 }
 
 double Tracker::cost(const Target& target, const Detection& detection) const noexcept {
@@ -217,16 +224,18 @@ double Tracker::cost(const Target& target, const Detection& detection) const noe
   return in_picture + in_depth + in_size + in_features + in_colour;
 }
 
-void Tracker::associate(std::span<const Detection> detections, bool confirmed) noexcept {
+// Solves targets against detections that both are still free, and hands the pairs on.
+template <class Wanted, class Cost, class Take>
+void Tracker::assign(std::span<const Detection> detections, double alone, Wanted&& wanted, Cost&& cost,
+                     Take&& take) noexcept {
   int rows = 0;
   int columns = 0;
   for (std::size_t j = 0; j < detections.size(); ++j) {
     if (detection_used_[j] == 0) detection_of_column_[static_cast<std::size_t>(columns++)] = static_cast<int>(j);
   }
   for (std::size_t i = 0; i < targets_.size(); ++i) {
-    if ((targets_[i].state != TrackState::kTentative) == confirmed) {
+    if (target_used_[i] == 0 && wanted(targets_[i]))
       target_of_row_[static_cast<std::size_t>(rows++)] = static_cast<int>(i);
-    }
   }
   for (int row = 0; row < rows; ++row) {
     const Target& target = targets_[static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)])];
@@ -235,18 +244,25 @@ void Tracker::associate(std::span<const Detection> detections, bool confirmed) n
       costs_[static_cast<std::size_t>(row * columns + column)] = cost(target, detections[static_cast<std::size_t>(j)]);
     }
   }
-  // A pair may be as far apart as the gate, or look somewhat different, but not both.
-  const double alone = square(config_.gate) + kStranger;
   assignment_.solve(costs_, rows, columns, alone, detection_of_row_);
   for (int row = 0; row < rows; ++row) {
     const int column = detection_of_row_[static_cast<std::size_t>(row)];
     if (column == Assignment::kNone) continue;
     const auto i = static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)]);
     const auto j = static_cast<std::size_t>(detection_of_column_[static_cast<std::size_t>(column)]);
-    measure(targets_[i], detections[j], static_cast<std::uint16_t>(j + 1));
+    take(targets_[i], detections[j], static_cast<std::uint16_t>(j + 1));
     target_used_[i] = 1;
     detection_used_[j] = 1;
   }
+}
+
+void Tracker::associate(std::span<const Detection> detections, bool confirmed) noexcept {
+  // A pair may be as far apart as the gate, or look somewhat different, but not both.
+  assign(
+      detections, square(config_.gate) + kStranger,
+      [=](const Target& target) { return (target.state != TrackState::kTentative) == confirmed; },
+      [this](const Target& target, const Detection& detection) { return cost(target, detection); },
+      [this](Target& target, const Detection& detection, std::uint16_t label) { measure(target, detection, label); });
 }
 
 // A target that turned at once, or comes out from behind something, is where its motion did not lead: near where it was
@@ -272,41 +288,87 @@ double Tracker::recovery_cost(const Target& target, const Detection& detection) 
   return step <= reach ? step / reach + strange / kRecoverStrange : Assignment::kForbidden;
 }
 
+// What covers the place where a target was seen a moment ago, and belongs to no other, is that target, whatever it
+// looks like by now: a person who walks under the camera changes depth and outline from frame to frame.
+double Tracker::overlap_cost(const Target& target, const Detection& detection) const noexcept {
+  if (target.misses_in_a_row > kOverlapMisses) return Assignment::kForbidden;
+  if (!is_large(detection.box)) return Assignment::kForbidden;
+  const double common = overlap(target.box, detection.box);
+  return common >= kOverlapPart ? 1 - common : Assignment::kForbidden;
+}
+
+void Tracker::restart(Target& target, const Detection& detection, std::uint16_t label) noexcept {
+  const Vector2 now(detection.centre_x(), detection.centre_y());
+  const Vector2 way = now - Vector2(target.last_x, target.last_y);
+  target.image.start(now, centre_noise(config_, detection.box), config_.initial_speed * view_.focal * kRecoverSpeed,
+                     way / std::max(target.unseen_s, 1e-3));
+  measure(target, detection, label);
+}
+
 void Tracker::recover(std::span<const Detection> detections) noexcept {
-  int rows = 0;
-  int columns = 0;
-  for (std::size_t j = 0; j < detections.size(); ++j) {
-    if (detection_used_[j] == 0) detection_of_column_[static_cast<std::size_t>(columns++)] = static_cast<int>(j);
-  }
+  assign(
+      detections, kRecoverAlone, [](const Target& target) { return target.state != TrackState::kTentative; },
+      [this](const Target& target, const Detection& detection) {
+        return std::min(recovery_cost(target, detection), overlap_cost(target, detection));
+      },
+      [this](Target& target, const Detection& detection, std::uint16_t label) { restart(target, detection, label); });
+}
+
+bool Tracker::is_large(const Rect& box) const noexcept {
+  return static_cast<double>(box.area()) >= kLargePart * view_.width * view_.height;
+}
+
+bool Tracker::is_leaving(const Target& target) const noexcept {
+  const Vector2 v = target.image.velocity();
+  return (target.box.left <= 0 && v.x() < 0) || (target.box.right() >= view_.width && v.x() > 0) ||
+         (target.box.top <= 0 && v.y() < 0) || (target.box.bottom() >= view_.height && v.y() > 0);
+}
+
+// Where a target has lost its own detection, the largest part of its region that was taken for something new so far is
+// the target.
+void Tracker::take_over(std::span<const Detection> detections) noexcept {
   for (std::size_t i = 0; i < targets_.size(); ++i) {
-    if (target_used_[i] == 0 && targets_[i].state != TrackState::kTentative) {
-      target_of_row_[static_cast<std::size_t>(rows++)] = static_cast<int>(i);
-    }
-  }
-  for (int row = 0; row < rows; ++row) {
-    const Target& target = targets_[static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)])];
-    for (int column = 0; column < columns; ++column) {
-      const int j = detection_of_column_[static_cast<std::size_t>(column)];
-      costs_[static_cast<std::size_t>(row * columns + column)] =
-          recovery_cost(target, detections[static_cast<std::size_t>(j)]);
-    }
-  }
-  assignment_.solve(costs_, rows, columns, 2, detection_of_row_);
-  for (int row = 0; row < rows; ++row) {
-    const int column = detection_of_row_[static_cast<std::size_t>(row)];
-    if (column == Assignment::kNone) continue;
-    const auto i = static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)]);
-    const auto j = static_cast<std::size_t>(detection_of_column_[static_cast<std::size_t>(column)]);
     Target& target = targets_[i];
-    const Detection& detection = detections[j];
-    const Vector2 now(detection.centre_x(), detection.centre_y());
-    const Vector2 way = now - Vector2(target.last_x, target.last_y);
-    target.image.start(now, centre_noise(config_, detection.box), config_.initial_speed * view_.focal * kRecoverSpeed,
-                       way / std::max(target.unseen_s, 1e-3));
-    measure(target, detection, static_cast<std::uint16_t>(j + 1));
+    if (target_used_[i] != 0 || target.state == TrackState::kTentative) continue;
+    Target* heir = nullptr;
+    for (std::size_t k = 0; k < targets_.size(); ++k) {
+      Target& child = targets_[k];
+      if (child.parent != target.id || child.state != TrackState::kTentative || target_used_[k] == 0) continue;
+      const auto common = static_cast<double>(intersect(child.box, target.box).area());
+      if (common < kInPlacePart * static_cast<double>(std::min(child.box.area(), target.box.area()))) continue;
+      if (is_leaving(target) && !is_large(child.box)) continue;
+      if (heir == nullptr || child.area > heir->area) heir = &child;
+    }
+    if (heir == nullptr) continue;
+    target.width = heir->width;
+    target.height = heir->height;
+    target.area = heir->area;
+    target.appearance = heir->appearance;
+    target.disparity_reach = heir->disparity_reach;
+    target.has_depth = heir->has_depth;
+    target.space = heir->space;
+    target.features = heir->features;
+    restart(target, detections[heir->label - 1U], heir->label);
     target_used_[i] = 1;
-    detection_used_[j] = 1;
+    heir->hits = 0;
   }
+  keep_targets([](const Target& target) { return target.hits > 0; });
+}
+
+// A target that began as a part of another's region is on trial until it is seen apart from it.
+void Tracker::follow_parent(Target& target) noexcept {
+  if (target.parent == 0) return;
+  const auto is_parent = [&](const Target& other) { return other.id == target.parent; };
+  const auto parent = std::find_if(targets_.begin(), targets_.end(), is_parent);
+  if (parent == targets_.end()) {
+    target.parent = 0;
+    return;
+  }
+  if (!target.measured || !parent->measured) return;
+  ++target.attached_frames;
+  const double size = std::max({target.width, target.height, parent->width, parent->height});
+  const bool apart = target.region != parent->region && gap(target.box, parent->box) > kTwinBeside * size;
+  if (apart || target.attached_frames > kTrialFrames) target.parent = 0;
 }
 
 void Tracker::measure(Target& target, const Detection& detection, std::uint16_t label) noexcept {
@@ -314,6 +376,7 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   const Vector2 z = centre(target, detection);
   (void)target.image.update(z, centre_noise(config_, detection.box));
   if (sees_depth(target, detection)) {
+    target.depth_unseen_s = 0;
     if (target.has_depth) {
       (void)target.space.update(detection.position, detection.position_covariance);
     } else {
@@ -327,6 +390,7 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   target.unseen_s = 0;
   ++target.hits;
   target.whole = detection.whole;
+  target.region = detection.region;
   if (detection.whole) ++target.whole_hits;
   const double rate = target.hits < 5 ? 1.0 / target.hits : kAppearanceRate;
   // An object gets smaller little by little; one that lost half at once is partly hidden.
@@ -357,7 +421,7 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   target.box = detection.box;
   target.hull = detection.hull;
   if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits &&
-      target.evidence >= config_.confirm_evidence && got_somewhere(target)) {
+      target.evidence >= config_.confirm_evidence && target.parent == 0 && got_somewhere(target)) {
     target.state = TrackState::kConfirmed;
   } else if (target.state == TrackState::kCoasting) {
     target.state = TrackState::kConfirmed;
@@ -419,6 +483,11 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   target.hits = 1;
   target.whole = detection.whole;
   target.whole_hits = detection.whole ? 1 : 0;
+  target.region = detection.region;
+  for (const Target& other : targets_) {
+    const bool shared = detection.region != 0 && other.region == detection.region;
+    if (other.measured && shared && target.parent == 0) target.parent = other.id;
+  }
   target.measured = true;
   target.image.start(Vector2(target.first_x, target.first_y), centre_noise(config_, detection.box),
                      config_.initial_speed * view_.focal);
@@ -509,22 +578,26 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
   std::fill(detection_used_.begin(), detection_used_.end(), static_cast<unsigned char>(0));
   std::fill(target_used_.begin(), target_used_.end(), static_cast<unsigned char>(0));
   for (Target& target : targets_) {
+    target.measured = false;
     target.age_s += dt_;
     target.unseen_s += dt_;
+    target.depth_unseen_s += dt_;
+    if (target.depth_unseen_s > kDepthLasts) target.has_depth = false;
     ++target.frames;
   }
   // Which targets are confirmed is decided before either round: a target confirmed now waits for the next frame.
-  const std::size_t known = targets_.size();
   associate(detections, true);
   associate(detections, false);
   recover(detections);
-  for (std::size_t i = 0; i < known; ++i) {
-    if (target_used_[i] == 0) miss(targets_[i]);
+  take_over(detections);
+  for (Target& target : targets_) {
+    if (!target.measured) miss(target);
   }
   keep_targets([this](const Target& target) { return !expired(target); });
   for (std::size_t j = 0; j < detections.size(); ++j) {
     if (detection_used_[j] == 0) start(detections[j], static_cast<std::uint16_t>(j + 1));
   }
+  for (Target& target : targets_) follow_parent(target);
   drop_twins();
   for (Target& target : targets_) renew_features(target, luma, labels);
   note_apart();
@@ -539,9 +612,7 @@ void Tracker::note_apart() noexcept {
       const Target& b = targets_[j];
       if (i == j || !a.whole || !b.whole) continue;
       const double size = std::max({a.width, a.height, b.width, b.height});
-      const double across = std::max({a.box.left - b.box.right(), b.box.left - a.box.right(), 0});
-      const double down = std::max({a.box.top - b.box.bottom(), b.box.top - a.box.bottom(), 0});
-      bool apart = std::max(across, down) > kApartGap * size;
+      bool apart = gap(a.box, b.box) > kApartGap * size;
       if (a.has_depth && b.has_depth) {
         const double za = a.space.position().z();
         const double zb = b.space.position().z();
@@ -559,14 +630,14 @@ void Tracker::report() noexcept {
     out.id = target.id;
     out.state = target.state;
     out.measured = target.measured;
-    out.has_depth = target.has_depth;
+    out.has_depth = target.has_depth && target.space.position().z() > 0;
     out.box = target.box;
     out.hull = target.hull;
     out.image_x = target.image.position().x();
     out.image_y = target.image.position().y();
     out.image_vx = target.image.velocity().x();
     out.image_vy = target.image.velocity().y();
-    if (target.has_depth) {
+    if (out.has_depth) {
       out.position = target.space.position();
       out.velocity = target.space.velocity();
       out.covariance = target.space.covariance();

@@ -32,6 +32,13 @@ namespace stereotrack {
 /// Recovery: a confirmed target without detection takes a detection without target near where it was last seen, if
 /// depth, size and looks agree: it has bounced, or comes out from behind something. Its motion starts anew.
 ///
+/// Large: so near the camera that a target fills a tenth of the picture, depth and outline change from frame to frame
+/// (a person who walks under it). There, what covers the place of a target that has just been seen is that target.
+///
+/// Parts: what begins inside another target's region (Detection::region) is on trial: not confirmed before it was
+/// seen apart from it, or for 15 frames. If meanwhile the other loses its detection, it takes over that part in its
+/// place.
+///
 /// Features: each target carries corners of its surface, searched in the window that their own filters predict
 /// (features.hpp). Those found vote for the detection in whose box they lie.
 ///
@@ -99,11 +106,14 @@ class Tracker {
     bool measured;
     bool has_depth;
     int hits;
-    std::uint64_t apart;  // see Prediction
-    bool whole;           // measured in this frame, as a region of its own
-    std::uint32_t twin;   // id of the larger target beside it that may be the same object, 0 = none
-    int twin_frames;      // for how long
-    double twin_dx;       // offset of the centres when that began [px]
+    std::uint64_t apart;   // see Prediction
+    bool whole;            // measured in this frame, as a region of its own
+    int region;            // of its detection in this frame
+    std::uint32_t parent;  // id of the target of whose region it began as a part, 0 = none
+    int attached_frames;   // for how long it has been so
+    std::uint32_t twin;    // id of the larger target beside it that may be the same object, 0 = none
+    int twin_frames;       // for how long
+    double twin_dx;        // offset of the centres when that began [px]
     double twin_dy;
     double twin_from_x;  // and where it was
     double twin_from_y;
@@ -112,6 +122,7 @@ class Tracker {
     int frames;
     double age_s;
     double unseen_s;
+    double depth_unseen_s;
     double way_px;   // net, from where it began
     double path_px;  // along the way
     double first_distance;
@@ -139,7 +150,15 @@ class Tracker {
   [[nodiscard]] Eigen::Vector2d centre(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double cost(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double recovery_cost(const Target& target, const Detection& detection) const noexcept;
+  [[nodiscard]] double overlap_cost(const Target& target, const Detection& detection) const noexcept;
+  template <class Wanted, class Cost, class Take>
+  void assign(std::span<const Detection> detections, double alone, Wanted&& wanted, Cost&& cost, Take&& take) noexcept;
+  void restart(Target& target, const Detection& detection, std::uint16_t label) noexcept;
   void recover(std::span<const Detection> detections) noexcept;
+  [[nodiscard]] bool is_large(const Rect& box) const noexcept;
+  [[nodiscard]] bool is_leaving(const Target& target) const noexcept;
+  void take_over(std::span<const Detection> detections) noexcept;
+  void follow_parent(Target& target) noexcept;
   void associate(std::span<const Detection> detections, bool confirmed) noexcept;
   void measure(Target& target, const Detection& detection, std::uint16_t label) noexcept;
   void renew_features(Target& target, ImageView<const std::uint8_t> luma,

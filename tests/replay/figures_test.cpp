@@ -92,10 +92,10 @@ TEST(Figures, EachPassUnderTheCeilingCameraHasATrack) {
   struct Pass {
     std::int64_t first;
     std::int64_t last;
-    std::size_t most_tracks;  ///< reached on 2026-11-22 plus one; target: 1
+    std::size_t most_tracks;  ///< reached on 2026-11-22, the target itself
     std::size_t least_rows;   ///< of the longest track: reached less a fifth
   };
-  constexpr std::array<Pass, 4> kPasses = {{{57, 81, 5, 5}, {102, 120, 3, 6}, {138, 174, 6, 9}, {207, 237, 4, 10}}};
+  constexpr std::array<Pass, 4> kPasses = {{{57, 81, 1, 10}, {102, 120, 1, 8}, {138, 174, 1, 20}, {207, 237, 1, 16}}};
   std::map<std::int64_t, std::size_t> length;
   for (const MotRow& row : rows) ++length[row.id];
   std::size_t outside = length.size();
@@ -113,7 +113,9 @@ TEST(Figures, EachPassUnderTheCeilingCameraHasATrack) {
     EXPECT_GE(longest, pass.least_rows);
     outside -= std::min(outside, tracks);
   }
-  EXPECT_LE(outside, 5U);  // reached: 4; target: the feet in the corner alone
+  // Reached: feet in the corner (24-54, 267-278), what they left in the background (93-101), a hand on the shelf
+  // (255-278). Target: the feet alone.
+  EXPECT_LE(outside, 4U);
 }
 
 struct Pitch {

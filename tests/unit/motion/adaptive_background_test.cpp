@@ -175,6 +175,36 @@ TEST(AdaptiveBackground, ExposureThatAlternatesDoesNotWearTheBackgroundOut) {
   }
 }
 
+TEST(AdaptiveBackground, ClippedBackgroundIsNoMotionUnderOtherExposure) {
+  // Left third clipped, the rest tells the gain; 252 is what a camera clips at.
+  const cv::Rect bright(0, 0, 32, 64);
+  const auto picture = [&](double light, int clipped) {
+    Plane y(kSize, static_cast<std::uint8_t>(180 * light));
+    y(bright) = static_cast<std::uint8_t>(clipped);
+    return y;
+  };
+  for (const double light : {0.9, 1.2}) {
+    Watch watch;
+    for (int k = 0; k < 20; ++k) watch.step(picture(1, 252));
+    watch.look(picture(light, 252));
+    EXPECT_EQ(watch.foreground(kAll), 0) << light;
+    watch.look(picture(light, light < 1 ? 200 : 230));  // darker than any light explains
+    EXPECT_GE(watch.foreground(bright), 0.95) << light;  // the edge moves no further than its tolerance
+  }
+}
+
+TEST(AdaptiveBackground, BackgroundThatMoreLightClipsIsNoMotion) {
+  Watch watch;
+  const auto picture = [&](int dark, int bright) {
+    Plane y(kSize, static_cast<std::uint8_t>(dark));
+    y(cv::Rect(0, 0, 32, 64)) = static_cast<std::uint8_t>(bright);
+    return y;
+  };
+  for (int k = 0; k < 20; ++k) watch.step(picture(100, 230));
+  watch.look(picture(130, 254));  // 230 x 1.3 would be 299
+  EXPECT_EQ(watch.foreground(kAll), 0);
+}
+
 TEST(AdaptiveBackground, EdgeMovedByAFractionOfAPixelIsNoMotion) {
   const auto edge_at = [](double column) {
     cv::Mat_<float> scene(kSize);

@@ -439,6 +439,98 @@ TEST_F(TrackerOf, RecoveredTargetGoesOnTheOtherWay) {
   EXPECT_NEAR(reports()[0].image_vx, -200, 40);
 }
 
+Detection part_of(int region, Detection detection) {
+  detection.region = region;
+  return detection;
+}
+
+TEST_F(TrackerOf, PartOfAnotherTargetsRegionIsOnTrialUntilItIsSeenApart) {
+  const auto body = [](int k) { return part_of(1, box_at({100 + 6 * k, 100, 40, 40}, 20)); };
+  const auto arm = [](int k, int region, int gap) {
+    return part_of(region, box_at({100 + 6 * k, 140 + gap, 40, 20}, 30));
+  };
+  for (int k = 0; k < 10; ++k) step({body(k)});
+  for (int k = 10; k < 20; ++k) step({body(k), arm(k, 1, 0)});
+  ASSERT_EQ(reports().size(), 2U);
+  EXPECT_EQ(reports()[1].state, TrackState::kTentative);
+  step({body(20), arm(20, 2, 0)});  // cut apart by a gap in the mask: still beside it
+  EXPECT_EQ(reports()[1].state, TrackState::kTentative);
+  for (int k = 21; k < 26; ++k) step({body(k), arm(k, 2, 3 * (k - 20))});
+  EXPECT_EQ(reports()[1].state, TrackState::kConfirmed);
+}
+
+TEST_F(TrackerOf, PartThatStaysAttachedIsATargetInTheEnd) {
+  for (int k = 0; k < 40; ++k) {
+    // It slides along the body, so that it is no fragment that goes along with it.
+    const int across = 2 * (k - 20);
+    std::vector<Detection> seen{part_of(1, box_at({100 + 6 * k, 100, 40, 40}, 20))};
+    if (k >= 10) seen.push_back(part_of(1, box_at({100 + 6 * k + across, 140, 20, 20}, 30)));
+    step(seen);
+    if (k == 20) {
+      EXPECT_EQ(count(TrackState::kConfirmed), 1);
+    }
+  }
+  EXPECT_EQ(count(TrackState::kConfirmed), 2);
+}
+
+TEST_F(TrackerOf, TargetThatLosesItsDetectionTakesOverThePartInItsPlace) {
+  struct Case {
+    const char* what;
+    Rect part;
+    std::uint32_t id;
+  };
+  // A leg is seen, then the body above it that hides it: at another depth, of another size.
+  for (const Case& one : {Case{"over it", {190, 120, 120, 100}, 1}, Case{"beside it", {280, 120, 120, 100}, 2}}) {
+    make(config());
+    const auto leg = [](int k) { return part_of(1, painted(box_at({100 + 8 * k, 160, 24, 60}, 16), kBlue)); };
+    const auto body = [&](int k) {
+      const Rect box{one.part.left + 8 * (k - 12), one.part.top, one.part.width, one.part.height};
+      return part_of(1, painted(box_at(box, 32), kRed));
+    };
+    for (int k = 0; k < 12; ++k) step({leg(k)});
+    for (int k = 12; k < 14; ++k) step({leg(k), body(k)});
+    ASSERT_EQ(reports().size(), 2U) << one.what;
+    step({body(14)});
+    const TrackReport seen = at(one.part.left + 16 + 60, one.part.top + 50);
+    EXPECT_TRUE(seen.measured) << one.what;
+    EXPECT_EQ(seen.id, one.id) << one.what;
+    EXPECT_EQ(reports().size(), one.id) << one.what;
+  }
+}
+
+TEST_F(TrackerOf, WhatLeavesThePictureIsNotReplacedByWhatEntersThere) {
+  const auto leaving = [](int k) { return part_of(1, painted(box_at({60 - 5 * k, 200, 40, 60}, 20), kRed)); };
+  const auto entering = [](int k) { return part_of(1, painted(box_at({0, 200, 10 + 6 * (k - 12), 60}, 30), kBlue)); };
+  for (int k = 0; k < 12; ++k) step({leaving(k)});
+  for (int k = 12; k < 14; ++k) step({part_of(1, painted(box_at({0, 200, 100 - 5 * k, 60}, 20), kRed)), entering(k)});
+  step({entering(14)});
+  EXPECT_TRUE(std::any_of(reports().begin(), reports().end(),
+                          [](const TrackReport& report) { return report.id == 2 && report.measured; }));
+}
+
+TEST_F(TrackerOf, LargeDetectionInItsPlaceIsTheTargetWhateverItLooksLike) {
+  for (const bool large : {true, false}) {
+    make(config());
+    const int size = large ? 200 : 100;  // 200 x 200 is an eighth of the picture
+    for (int k = 0; k < 6; ++k) step({painted(box_at({100 + 8 * k, 100, size, size}, 20), kRed)});
+    step({painted(box_at({148, 110, size, size}, 40), kBlue)});
+    EXPECT_EQ(reports().size(), large ? 1U : 2U);
+    EXPECT_EQ(reports().back().id, large ? 1U : 2U);
+    EXPECT_TRUE(reports().back().measured);
+  }
+}
+
+TEST_F(TrackerOf, DistanceThatNobodyMeasuresIsNotGuessedForLong) {
+  int k = 0;
+  for (; k < 10; ++k) step({seen_at(100 + 2 * k, 200, 20)});
+  EXPECT_TRUE(reports()[0].has_depth);
+  for (; k < 50; ++k) step({seen_at(100 + 2 * k, 200)});
+  EXPECT_TRUE(reports()[0].has_depth);
+  for (; k < 70; ++k) step({seen_at(100 + 2 * k, 200)});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_FALSE(reports()[0].has_depth);
+}
+
 TEST_F(TrackerOf, FragmentThatGoesAlongWithABodyIsDropped) {
   struct Case {
     const char* what;
