@@ -29,7 +29,7 @@ constexpr int kWidestGap = 64;        // [px]
 constexpr int kWidestColumnGap = 16;  // [px]
 // A region's match counts if the second best place is at least this much worse.
 constexpr double kUnique = 1.5;
-constexpr double kLeastCost = 9;  // of a region's match, by noise alone [grey levels squared]
+constexpr double kLeastCost = 9;    // of a region's match, by noise alone [grey levels squared]
 constexpr double kSurePart = 0.10;  // a match less certain than this part of its disparity says nothing
 // Room around a predicted disparity, in standard deviations and as a fraction, for targets that accelerate.
 constexpr double kRangeSd = 3;
@@ -622,8 +622,8 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
     } else if (const RegionMatch whole = match(left_.background_canvas, right_.background_canvas, {}); whole.found) {
       before = whole.disparity_px;
     }
-    const double limit = std::max(config_.shadow.own_depth_px,
-                                  std::min(2.5 * candidate.disparity_sd, kSurePart * candidate.disparity));
+    const double limit =
+        std::max(config_.shadow.own_depth_px, std::min(2.5 * candidate.disparity_sd, kSurePart * candidate.disparity));
     candidate.own_surface =
         before >= 0 && (candidate.disparity - before <= limit || fits_at(before, roi, candidate.area));
   }
