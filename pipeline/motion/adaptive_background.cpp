@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <numeric>
+
+#include "pipeline/motion/distance_kernel.hpp"
 
 namespace stereotrack {
 
@@ -11,16 +14,9 @@ namespace {
 // A fresh pixel's deviation [8.8] and how many frames that guess weighs: one frame says nothing about noise.
 constexpr int kPriorDeviation = 3 * 256;
 constexpr int kPriorFrames = 8;
-// Grid of the gain estimate and its histogram: ratios 1/4 .. 4 around 256.
-constexpr int kGainStep = 3;
-constexpr int kGainBins = 1024;
-constexpr int kGainDarkest = 20 * 256;  // below, the ratio is mostly noise [8.8]
-// From here on a pixel is clipped: it says no more than that it is at least so bright [8.8].
-constexpr int kClipped = 250 * 256;
+constexpr int kSameLight = 256;  // a gain
 // How far a pixel may be from its candidate and still be the same look [8.8].
 constexpr int kCandidateReach = 12 * 256;
-
-int rounded(std::uint16_t fixed) noexcept { return std::min((fixed + 128) >> 8, 255); }
 
 }  // namespace
 
@@ -49,31 +45,31 @@ Result<AdaptiveBackground> AdaptiveBackground::create(const Config& config, int 
   self.age_ = arena.image<std::uint16_t>(width, height);
   self.candidate_age_ = arena.image<std::uint16_t>(width, height);
   self.luma_ = arena.image<std::uint8_t>(width, height);
-  self.range_ = arena.image<std::uint8_t>(width, height);
+  self.range_ = arena.array<std::uint8_t>(static_cast<std::size_t>(width));
+  self.bins_ = arena.array<std::uint16_t>(static_cast<std::size_t>(width));
   self.foreground_ = arena.image<std::uint8_t>(width, height);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
 }
 
 int AdaptiveBackground::estimate_gain(ImageView<const std::uint8_t> y) const noexcept {
-  std::array<std::uint32_t, kGainBins> histogram{};
-  std::uint32_t total = 0;
+  // Neighbours mostly fall into one bin, and four tables need not wait for each other's last count.
+  constexpr int kTables = 4;
+  std::array<std::array<std::uint32_t, kGainBins + 1>, kTables> histogram{};
+  const int columns = (y.width + kGainStep - 1) / kGainStep;
   for (int v = 0; v < y.height; v += kGainStep) {
-    for (int u = 0; u < y.width; u += kGainStep) {
-      const int background = y_.mean.at(u, v);
-      const int now = y.at(u, v);
-      if (background < kGainDarkest || background > kClipped || now < 4 || now > 250 || foreground_.at(u, v) != 0) {
-        continue;
-      }
-      ++histogram[static_cast<std::size_t>(std::min((now * 65536 + background / 2) / background, kGainBins - 1))];
-      ++total;
-    }
+    gain_bins(y.row(v), y_.mean.row(v), foreground_.row(v), columns, bins_.data());
+    for (int i = 0; i < columns; ++i) ++histogram[static_cast<std::size_t>(i % kTables)][bins_[i]];
   }
+  for (int table = 1; table < kTables; ++table) {
+    for (std::size_t bin = 0; bin < kGainBins; ++bin) histogram[0][bin] += histogram[table][bin];
+  }
+  const std::uint32_t total = std::accumulate(histogram[0].begin(), histogram[0].end() - 1, 0U);
   if (total < 64) return 256;
   std::uint32_t below = 0;
   int median = 0;
-  while (below + histogram[static_cast<std::size_t>(median)] <= total / 2) {
-    below += histogram[static_cast<std::size_t>(median)];
+  while (below + histogram[0][static_cast<std::size_t>(median)] <= total / 2) {
+    below += histogram[0][static_cast<std::size_t>(median)];
     ++median;
   }
   return std::clamp(median, 64, 1023);
@@ -88,54 +84,26 @@ void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t>
   }
   gain_ = estimate_gain(picture.y);
   for (int y = 0; y < height; ++y) {
-    const std::uint16_t* mean = y_.mean.row(y);
-    std::uint8_t* luma = luma_.row(y);
-    for (int x = 0; x < width; ++x) {
-      luma[x] = static_cast<std::uint8_t>(std::min((mean[x] * gain_ + (1 << 15)) >> 16, 255));
-    }
+    lit_row(y_.mean.row(y), gain_, width, luma_.row(y));
     if (colour_) {
-      for (int x = 0; x < width; ++x) cb_.shown.at(x, y) = static_cast<std::uint8_t>(rounded(cb_.mean.at(x, y)));
-      for (int x = 0; x < width; ++x) cr_.shown.at(x, y) = static_cast<std::uint8_t>(rounded(cr_.mean.at(x, y)));
+      lit_row(cb_.mean.row(y), kSameLight, width, cb_.shown.row(y));
+      lit_row(cr_.mean.row(y), kSameLight, width, cr_.shown.row(y));
     }
   }
+  const auto channel = [](ImageView<const std::uint8_t> plane, const Channel& known, int y) {
+    return ChannelRow{plane.row(y), known.mean.row(y), known.deviation.row(y)};
+  };
   for (int y = 0; y < height; ++y) {
-    const int above = std::max(y - 1, 0);
-    const int under = std::min(y + 1, height - 1);
-    for (int x = 0; x < width; ++x) {
-      const int before = std::max(x - 1, 0);
-      const int after = std::min(x + 1, width - 1);
-      int low = 255;
-      int high = 0;
-      for (int v = above; v <= under; ++v) {
-        const std::uint8_t* row = luma_.row(v);
-        for (int u = before; u <= after; ++u) {
-          low = std::min<int>(low, row[u]);
-          high = std::max<int>(high, row[u]);
-        }
-      }
-      range_.at(x, y) = static_cast<std::uint8_t>(high - low);
-    }
-  }
-  for (int y = 0; y < height; ++y) {
-    std::uint8_t* result = out.row(y);
-    for (int x = 0; x < width; ++x) {
-      const int tolerance = range_.at(x, y) * config_.edge_percent * 256 / 100;
-      const int now = picture.y.at(x, y) << 8;
-      const int expected = (y_.mean.at(x, y) * gain_) >> 8;
-      const bool clipped = std::max<int>(y_.mean.at(x, y), expected) >= kClipped;
-      const int apart = std::max(std::min(expected, kClipped) - now, now - (clipped ? 255 << 8 : expected));
-      const int noise = y_.deviation.at(x, y) * 5 / 4 + config_.noise_floor;
-      const int luma = std::max(apart - tolerance, 0) * kStepsPerSd / noise;
-      int colour = 0;
-      if (colour_) {
-        const int blue = std::abs((picture.cb.at(x, y) << 8) - cb_.mean.at(x, y)) * kStepsPerSd /
-                         (cb_.deviation.at(x, y) * 5 / 4 + config_.noise_floor);
-        const int red = std::abs((picture.cr.at(x, y) << 8) - cr_.mean.at(x, y)) * kStepsPerSd /
-                        (cr_.deviation.at(x, y) * 5 / 4 + config_.noise_floor);
-        colour = std::max(blue, red);
-      }
-      result[x] = static_cast<std::uint8_t>(std::min(std::max(luma, colour) + std::min(luma, colour) / 2, 255));
-    }
+    range_row({luma_.row(std::max(y - 1, 0)), luma_.row(y), luma_.row(std::min(y + 1, height - 1))}, width,
+              range_.data());
+    distance_row({.y = channel(picture.y, y_, y),
+                  .cb = colour_ ? channel(picture.cb, cb_, y) : ChannelRow{},
+                  .cr = colour_ ? channel(picture.cr, cr_, y) : ChannelRow{},
+                  .range = range_.data(),
+                  .gain = gain_,
+                  .noise_floor = config_.noise_floor,
+                  .edge_percent = config_.edge_percent},
+                 width, out.row(y));
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
@@ -97,8 +98,9 @@ class AdaptiveBackground {
   ImageView<std::uint16_t> age_;
   ImageView<std::uint16_t> candidate_age_;
   ImageView<std::uint8_t> luma_;
-  ImageView<std::uint8_t> range_;
   ImageView<std::uint8_t> foreground_;
+  std::span<std::uint8_t> range_;  // of one row
+  std::span<std::uint16_t> bins_;  // of one row
 };
 
 }  // namespace stereotrack
