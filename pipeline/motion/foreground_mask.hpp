@@ -6,14 +6,14 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
-#include "pipeline/shape/blob_extractor.hpp"
+#include "pipeline/motion/candidate_kernel.hpp"
+#include "pipeline/shape/run_length.hpp"
 
 namespace stereotrack {
 
 /// Foreground of the robust preset: from the distance to the background (AdaptiveBackground) to a mask.
 /// 1. a pixel is a candidate from `low` on, a seed from `high` on; one below `low` is a candidate, too, if the mean
-/// over
-///    5x5 reaches `faint` and half of the largest distance within 2 px: large parts that differ little;
+///    over 5x5 reaches `faint` and half of the largest distance within 2 px: large parts that differ little;
 /// 2. halo: smoothing and blur spread a strong object over its rim. A candidate under halo_percent of the
 ///    largest distance within 2 px is rim, not object;
 /// 3. a pixel stays if most of its 3x3 neighbourhood are candidates, which removes single noisy pixels;
@@ -39,16 +39,16 @@ class ForegroundMask {
   [[nodiscard]] Result<double> run(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept;
 
  private:
-  explicit ForegroundMask(const BlobExtractor& components) noexcept : components_(components) {}
+  [[nodiscard]] double keep_seeded(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept;
 
-  int low_ = 0;
+  int width_ = 0;
+  int height_ = 0;
+  CandidateLimits limits_;
   int high_ = 0;
-  int faint_ = 0;
-  Config config_;
-  ImageView<std::uint8_t> candidates_;
-  ImageView<std::uint8_t> row_max_;
-  BlobExtractor components_;
-  std::span<std::uint32_t> seeds_;
+  int min_seeds_ = 0;
+  CandidateWorkspace work_;
+  std::span<Run> runs_;
+  std::span<std::int32_t> seeds_;  // by root run
 };
 
 }  // namespace stereotrack

@@ -199,7 +199,8 @@ TEST(ForegroundMask, Faults) {
   EXPECT_EQ(fault_of([](auto& c) { c.halo_percent = -1; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.halo_percent = 91; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.min_seeds = 0; }), Fault::kBadConfig);
-  EXPECT_NE(fault_of(nothing, 0, 8), Fault{}) << "kBadConfig from its blob extractor, kBadSize of its own";
+  EXPECT_EQ(fault_of([](auto& c) { c.max_runs = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of(nothing, 0, 8), Fault::kBadSize);
   arena.seal();
   EXPECT_EQ(fault_of(nothing), Fault::kOutOfMemory);
 }
