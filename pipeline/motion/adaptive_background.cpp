@@ -2,21 +2,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <numeric>
 
 #include "pipeline/motion/distance_kernel.hpp"
+#include "pipeline/motion/learn_kernel.hpp"
 
 namespace stereotrack {
 
 namespace {
 
-// A fresh pixel's deviation [8.8] and how many frames that guess weighs: one frame says nothing about noise.
-constexpr int kPriorDeviation = 3 * 256;
-constexpr int kPriorFrames = 8;
 constexpr int kSameLight = 256;  // a gain
-// How far a pixel may be from its candidate and still be the same look [8.8].
-constexpr int kCandidateReach = 12 * 256;
 
 }  // namespace
 
@@ -107,77 +102,24 @@ void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t>
   }
 }
 
-void AdaptiveBackground::blend(Channel& channel, int x, int y, std::uint8_t value, int rate) noexcept {
-  const int now = value << 8;
-  std::uint16_t& mean = channel.mean.at(x, y);
-  const int apart = now - mean;
-  std::uint16_t& deviation = channel.deviation.at(x, y);
-  mean = static_cast<std::uint16_t>(mean + apart / rate);
-  deviation = static_cast<std::uint16_t>(deviation + (std::abs(apart) - deviation) / (rate + kPriorFrames));
-}
-
-bool AdaptiveBackground::near_candidate(const Planes& picture, int x, int y) const noexcept {
-  if (std::abs((picture.y.at(x, y) << 8) - y_.candidate.at(x, y)) > kCandidateReach) return false;
-  return !colour_ || (std::abs((picture.cb.at(x, y) << 8) - cb_.candidate.at(x, y)) <= kCandidateReach &&
-                      std::abs((picture.cr.at(x, y) << 8) - cr_.candidate.at(x, y)) <= kCandidateReach);
-}
-
 void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8_t> mask) noexcept {
-  const int absorb = config_.absorb_frames;
-  const auto each_channel = [&](auto&& act) {
-    act(y_, picture.y);
-    if (colour_) {
-      act(cb_, picture.cb);
-      act(cr_, picture.cr);
-    }
+  const LearnRates rates{.window = config_.window, .absorb = config_.absorb_frames};
+  const auto channel = [](ImageView<const std::uint8_t> plane, const Channel& known, int y) {
+    return LearnRow::Channel{plane.row(y), known.mean.row(y), known.deviation.row(y), known.candidate.row(y)};
   };
   std::uint64_t changed = 0;
   for (int y = 0; y < age_.height; ++y) {
-    for (int x = 0; x < age_.width; ++x) {
-      std::uint16_t& age = age_.at(x, y);
-      std::uint16_t& candidate_age = candidate_age_.at(x, y);
-      foreground_.at(x, y) = seen_ > 0 ? mask.at(x, y) : std::uint8_t{0};
-      if (age == 0 || mask.at(x, y) == kForget) {
-        each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
-          channel.mean.at(x, y) = static_cast<std::uint16_t>(plane.at(x, y) << 8);
-          channel.deviation.at(x, y) = kPriorDeviation;
-        });
-        age = 1;
-        candidate_age = 0;
-        continue;
-      }
-      if (mask.at(x, y) == 0) {
-        const int rate = std::min(age + 1, config_.window);
-        each_channel(
-            [&](Channel& channel, ImageView<const std::uint8_t> plane) { blend(channel, x, y, plane.at(x, y), rate); });
-        age = static_cast<std::uint16_t>(std::min(age + 1, absorb));
-        if (candidate_age > 0) --candidate_age;
-        continue;
-      }
-      ++changed;
-      if (candidate_age == 0 || !near_candidate(picture, x, y)) {
-        each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
-          channel.candidate.at(x, y) = static_cast<std::uint16_t>(plane.at(x, y) << 8);
-        });
-        candidate_age = 1;
-        continue;
-      }
-      ++candidate_age;
-      each_channel([&](Channel& channel, ImageView<const std::uint8_t> plane) {
-        std::uint16_t& candidate = channel.candidate.at(x, y);
-        const int apart = (plane.at(x, y) << 8) - candidate;
-        candidate = static_cast<std::uint16_t>(candidate + apart / std::min<int>(candidate_age, config_.window));
-      });
-      // A look must last at least kPriorFrames: a slow object in the first frames is no background.
-      if (candidate_age > std::max<int>(age, kPriorFrames) || candidate_age >= absorb) {
-        each_channel([&](Channel& channel, ImageView<const std::uint8_t>) {
-          std::swap(channel.mean.at(x, y), channel.candidate.at(x, y));
-          channel.deviation.at(x, y) = kPriorDeviation;
-        });
-        std::swap(age, candidate_age);
-        candidate_age = static_cast<std::uint16_t>(candidate_age / 2);
-      }
+    if (seen_ > 0) std::copy_n(mask.row(y), age_.width, foreground_.row(y));
+    LearnRow row{.channels = {channel(picture.y, y_, y)},
+                 .count = colour_ ? 3 : 1,
+                 .age = age_.row(y),
+                 .candidate_age = candidate_age_.row(y),
+                 .mask = mask.row(y)};
+    if (colour_) {
+      row.channels[1] = channel(picture.cb, cb_, y);
+      row.channels[2] = channel(picture.cr, cr_, y);
     }
+    changed += static_cast<std::uint64_t>(learn_row(row, rates, age_.width));
   }
   ++seen_;
   const auto pixels = static_cast<std::uint64_t>(age_.width) * static_cast<std::uint64_t>(age_.height);

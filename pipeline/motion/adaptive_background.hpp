@@ -85,8 +85,6 @@ class AdaptiveBackground {
   };
 
   int estimate_gain(ImageView<const std::uint8_t> y) const noexcept;
-  static void blend(Channel& channel, int x, int y, std::uint8_t value, int rate) noexcept;
-  bool near_candidate(const Planes& picture, int x, int y) const noexcept;
 
   Config config_;
   bool colour_ = false;

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "pipeline/core/simd.hpp"
+#include "pipeline/motion/adaptive_background.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pipeline/motion/distance_kernel.cpp"
@@ -15,7 +16,7 @@
 namespace stereotrack {
 namespace {
 
-constexpr int kStepsPerSd = 4;
+constexpr int kStepsPerSd = AdaptiveBackground::kStepsPerSd;
 constexpr int kGainDarkest = 20 * 256;     // below, the ratio is mostly noise [8.8]
 // From here on a pixel is clipped: it says no more than that it is at least so bright [8.8].
 constexpr int kClipped = 250 * 256;
