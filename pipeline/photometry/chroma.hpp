@@ -5,6 +5,7 @@
 
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/frame.hpp"
+#include "pipeline/photometry/colour_kernel.hpp"
 
 namespace stereotrack {
 
@@ -26,14 +27,7 @@ namespace stereotrack {
 inline void chroma(const Picture& in, ImageView<const std::uint8_t> luma_plane, ImageView<std::uint8_t> cb,
                    ImageView<std::uint8_t> cr) noexcept {
   for (int y = 0; y < cb.height; ++y) {
-    const std::uint8_t* src = in.row(y);
-    const std::uint8_t* luma_row = luma_plane.row(y);
-    std::uint8_t* cb_row = cb.row(y);
-    std::uint8_t* cr_row = cr.row(y);
-    for (int x = 0; x < cb.width; ++x) {
-      cb_row[x] = chroma_blue(src[3 * x], luma_row[x]);
-      cr_row[x] = chroma_red(src[3 * x + 2], luma_row[x]);
-    }
+    chroma_row(in.row(y), luma_plane.row(y), cb.width, cb.row(y), cr.row(y));
   }
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/frame.hpp"
+#include "pipeline/photometry/colour_kernel.hpp"
 
 namespace stereotrack {
 
@@ -19,12 +21,10 @@ namespace stereotrack {
 /// out: picture's size. O(pixels). Any thread, no state.
 inline void gray(const Picture& in, ImageView<std::uint8_t> out) noexcept {
   for (int y = 0; y < out.height; ++y) {
-    const std::uint8_t* src = in.row(y);
-    std::uint8_t* dst = out.row(y);
     if (in.format == PixelFormat::kBgr8) {
-      for (int x = 0; x < out.width; ++x) dst[x] = luma(src[3 * x], src[3 * x + 1], src[3 * x + 2]);
+      luma_row(in.row(y), out.width, out.row(y));
     } else {
-      for (int x = 0; x < out.width; ++x) dst[x] = src[x];
+      std::copy_n(in.row(y), out.width, out.row(y));
     }
   }
 }
