@@ -334,13 +334,7 @@ void Pipeline::foreground_from_model() noexcept {
   if (!rectifier_) return;
   background_right_->distance({right_.smooth_y, {}, {}}, right_.distance);
   (void)foreground_right_->run(right_.distance, right_.mask);
-  const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kRight);
-  for (int v = 0; v < right_moving_.height; ++v) {
-    for (int u = 0; u < right_moving_.width; ++u) {
-      const Rectifier::Point16 p = raw.at(u, v);
-      right_moving_.at(u, v) = p.valid() ? right_.mask.at(p.x, p.y) : std::uint8_t{0};
-    }
-  }
+  rectifier_->rectify(right_.mask, View::kRight, right_moving_, Sampling::kNearest);
   rectifier_->rectify(background_left_->luma(), View::kLeft, left_.background_canvas);
   rectifier_->rectify(background_right_->luma(), View::kRight, right_.background_canvas);
   if (frames_ > 1 && config_.shadow.method == ShadowMethod::kStereo) renew_background_disparity();

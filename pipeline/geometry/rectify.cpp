@@ -8,10 +8,10 @@
 namespace stereotrack {
 namespace {
 
-constexpr int kMaxSide = 16384;   // positions in a canvas of 1.5 times this fit 16 bits
-constexpr int kSubPixels = 32;    // positions are kept in 1/32 px, as cv::remap does
-constexpr int kSamples = 65;      // of a raw picture, each way, to find what it covers
-constexpr double kFlattest = 20;  // a ray flatter than this (tan of its angle) counts as this flat
+constexpr int kMaxSide = 16384;                     // positions in a canvas of 1.5 times this fit 16 bits
+constexpr int kSubPixels = RemapTable::kSubPixels;  // positions are kept in 1/32 px, as cv::remap does
+constexpr int kSamples = 65;                        // of a raw picture, each way, to find what it covers
+constexpr double kFlattest = 20;                    // a ray flatter than this (tan of its angle) counts as this flat
 
 /// Unit quaternion w + (x, y, z) by hand: Eigen's conversions call the C library's sin and acos.
 struct Quaternion {
@@ -218,15 +218,18 @@ bool Rectifier::fill(View view, Arena& arena) noexcept {
   const double cx = is_left ? g.cx_left : g.cx_right;
 
   Map map;
-  map.corner = arena.image<Point16>(width, g.height);
-  map.fractions = arena.image<std::uint16_t>(width, g.height);
+  RemapTable& table = map.table;
+  table.corner = arena.image<Point16>(width, g.height);
+  table.fractions = arena.image<std::uint16_t>(width, g.height);
+  table.mask = arena.image<std::uint8_t>(width, g.height);
+  table.window = arena.image<Point16>((width + RemapTable::kBlock - 1) / RemapTable::kBlock, g.height);
+  table.place = arena.image<std::uint8_t>(width, g.height);
   map.nearest = arena.image<Point16>(width, g.height);
-  map.mask = arena.image<std::uint8_t>(width, g.height);
-  if (map.corner.empty() || map.fractions.empty() || map.nearest.empty() || map.mask.empty()) return false;
+  if (arena.failed()) return false;
 
   for (int v = 0; v < g.height; ++v) {
     for (int u = 0; u < width; ++u) {
-      map.corner.at(u, v) = {};
+      table.corner.at(u, v) = {};
       map.nearest.at(u, v) = {};
       const Eigen::Vector3d ray = back * Eigen::Vector3d((u - cx) / g.f, (v - g.cy) / g.f, 1.0);
       if (!(ray.z() > 0)) continue;
@@ -239,14 +242,15 @@ bool Rectifier::fill(View view, Arena& arena) noexcept {
       // On the last column and row the corner steps back, so that all four pixels exist.
       const int corner_x = std::min(x / kSubPixels, raw_width_ - 2);
       const int corner_y = std::min(y / kSubPixels, raw_height_ - 2);
-      map.corner.at(u, v) = {static_cast<std::int16_t>(corner_x), static_cast<std::int16_t>(corner_y)};
-      map.fractions.at(u, v) =
-          static_cast<std::uint16_t>((x - corner_x * kSubPixels) + 2 * kSubPixels * (y - corner_y * kSubPixels));
+      table.corner.at(u, v) = {static_cast<std::int16_t>(corner_x), static_cast<std::int16_t>(corner_y)};
+      table.fractions.at(u, v) = static_cast<std::uint16_t>((x - corner_x * kSubPixels) +
+                                                            ((y - corner_y * kSubPixels) << RemapTable::kFractionBits));
       map.nearest.at(u, v) = {static_cast<std::int16_t>((x + kSubPixels / 2) / kSubPixels),
                               static_cast<std::int16_t>((y + kSubPixels / 2) / kSubPixels)};
-      map.mask.at(u, v) = 255;
+      table.mask.at(u, v) = 255;
     }
   }
+  table.find_windows(raw_width_, raw_height_);
   (is_left ? left_ : right_) = map;
   return true;
 }
@@ -275,29 +279,11 @@ bool Rectifier::fill_rectified_from_raw(Arena& arena) noexcept {
   return true;
 }
 
-void Rectifier::rectify(ImageView<const std::uint8_t> raw, View view, ImageView<std::uint8_t> out) const noexcept {
-  const Map& map = of(view);
-  if (raw.width != raw_width_ || raw.height != raw_height_ || !out.same_size(map.corner)) return;
-  constexpr unsigned kFractionMask = 2 * kSubPixels - 1;
-  for (int v = 0; v < out.height; ++v) {
-    const Point16* corners = map.corner.row(v);
-    const std::uint16_t* fractions = map.fractions.row(v);
-    std::uint8_t* line = out.row(v);
-    for (int u = 0; u < out.width; ++u) {
-      if (!corners[u].valid()) {
-        line[u] = 0;
-        continue;
-      }
-      const std::uint8_t* upper = raw.row(corners[u].y) + corners[u].x;
-      const std::uint8_t* lower = upper + raw.stride;
-      const unsigned a = fractions[u] & kFractionMask;
-      const unsigned b = fractions[u] / (2 * kSubPixels);
-      const unsigned top = upper[0] * (kSubPixels - a) + upper[1] * a;
-      const unsigned bottom = lower[0] * (kSubPixels - a) + lower[1] * a;
-      line[u] = static_cast<std::uint8_t>((top * (kSubPixels - b) + bottom * b + kSubPixels * kSubPixels / 2) /
-                                          (kSubPixels * kSubPixels));
-    }
-  }
+void Rectifier::rectify(ImageView<const std::uint8_t> raw, View view, ImageView<std::uint8_t> out,
+                        Sampling sampling) const noexcept {
+  const RemapTable& table = of(view).table;
+  if (raw.width != raw_width_ || raw.height != raw_height_ || !out.same_size(table.corner)) return;
+  for (int v = 0; v < out.height; ++v) remap_row(raw, table, v, sampling, out.row(v));
 }
 
 std::optional<Eigen::Vector2d> Rectifier::rectified_from_raw(double x, double y) const noexcept {

@@ -11,6 +11,7 @@
 #include "pipeline/geometry/calibration.hpp"
 #include "pipeline/geometry/camera.hpp"
 #include "pipeline/geometry/rectified_geometry.hpp"
+#include "pipeline/geometry/remap_kernel.hpp"
 
 namespace stereotrack {
 
@@ -63,20 +64,14 @@ struct RectificationPlan {
 /// which is what cv::remap(INTER_LINEAR) does with the same map, bit for bit (but for positions halfway
 /// between two 1/32 px, which OpenCV's float maps may round the other way).
 ///
-/// Memory from the arena at create(): 11 bytes a canvas pixel, 8 bytes a raw pixel; 49 MB and 0.3 s for
-/// 1280x720 with a wide lens. run: rectify() about 2 ns a pixel, no allocation. Immutable after create():
+/// Memory from the arena at create(): 13 bytes a canvas pixel, 8 bytes a raw pixel; 55 MB and 0.3 s for
+/// 1280x720 with a wide lens. run: rectify() 0.3 to 2 ns a pixel, no allocation. Immutable after create():
 /// any thread.
 class Rectifier {
  public:
   static constexpr double kMaxGrowth = 1.5;
 
-  /// Whole raw pixel; (-1, -1) where the canvas shows nothing of the raw picture.
-  struct Point16 {
-    std::int16_t x = -1;
-    std::int16_t y = -1;
-    [[nodiscard]] bool valid() const noexcept { return x >= 0; }
-    friend bool operator==(const Point16&, const Point16&) = default;
-  };
+  using Point16 = RawPixel;
   /// Place on a canvas [px], may lie outside of it; (kNowhere, kNowhere) where the lens equation has no ray.
   struct PointF {
     static constexpr float kNowhere = -32768.0F;
@@ -95,11 +90,13 @@ class Rectifier {
   [[nodiscard]] int raw_height() const noexcept { return raw_height_; }
 
   /// In: one channel of the raw picture of `view`, raw size. Out: its canvas (width_left or width_right by
-  /// height); 0 where it shows nothing of the raw picture. With other sizes `out` is left untouched.
-  void rectify(ImageView<const std::uint8_t> raw, View view, ImageView<std::uint8_t> out) const noexcept;
+  /// height); 0 where it shows nothing of the raw picture. With other sizes `out` is left untouched. kNearest is for
+  /// masks: each pixel's raw_from_rectified().
+  void rectify(ImageView<const std::uint8_t> raw, View view, ImageView<std::uint8_t> out,
+               Sampling sampling = Sampling::kBilinear) const noexcept;
 
   /// 255 where the canvas shows a place of the raw picture, else 0.
-  [[nodiscard]] ImageView<const std::uint8_t> mask(View view) const noexcept { return of(view).mask; }
+  [[nodiscard]] ImageView<const std::uint8_t> mask(View view) const noexcept { return of(view).table.mask; }
 
   /// Canvas pixel -> nearest raw pixel.
   [[nodiscard]] ImageView<const Point16> raw_from_rectified(View view) const noexcept { return of(view).nearest; }
@@ -117,10 +114,8 @@ class Rectifier {
 
  private:
   struct Map {
-    ImageView<Point16> corner;           ///< upper left of the four raw pixels that are mixed
-    ImageView<std::uint16_t> fractions;  ///< a + 64 b, each 0..32
+    RemapTable table;
     ImageView<Point16> nearest;
-    ImageView<std::uint8_t> mask;
   };
 
   explicit Rectifier(const RectificationPlan& plan) noexcept : plan_(plan) {}

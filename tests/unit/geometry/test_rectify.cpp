@@ -198,18 +198,23 @@ TEST(Rectify, PicturesAreThoseOfCvRemapBitForBit) {
       cv::remap(raw, expected, map_x, map_y, cv::INTER_LINEAR);
       cv::Mat out(g.height, width, CV_8U, cv::Scalar(99));
       rectifier->rectify(view_of(raw), view, {out.data, width, g.height, static_cast<std::ptrdiff_t>(out.step)});
+      cv::Mat picked(g.height, width, CV_8U, cv::Scalar(99));
+      rectifier->rectify(view_of(raw), view, {picked.data, width, g.height, static_cast<std::ptrdiff_t>(picked.step)},
+                         Sampling::kNearest);
       int shown = 0;
       int different = 0;
       for (int v = 0; v < g.height; ++v) {
         for (int u = 0; u < width; ++u) {
           if (rectifier->mask(view).at(u, v) == 0) {
             EXPECT_EQ(out.at<std::uint8_t>(v, u), 0);
+            EXPECT_EQ(picked.at<std::uint8_t>(v, u), 0);
             EXPECT_EQ(rectifier->raw_from_rectified(view).at(u, v), Rectifier::Point16{});
             continue;
           }
           ++shown;
           if (out.at<std::uint8_t>(v, u) != expected.at<std::uint8_t>(v, u)) ++different;
           const Rectifier::Point16 nearest = rectifier->raw_from_rectified(view).at(u, v);
+          EXPECT_EQ(picked.at<std::uint8_t>(v, u), raw.at<std::uint8_t>(nearest.y, nearest.x));
           EXPECT_NEAR(nearest.x, map_x.at<float>(v, u), 0.52);
           EXPECT_NEAR(nearest.y, map_y.at<float>(v, u), 0.52);
         }
