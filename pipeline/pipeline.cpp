@@ -639,12 +639,8 @@ bool Pipeline::fits_at(double disparity, const Rect& roi, int area) noexcept {
 }
 
 // Half of the region's pixels look like the background under another light.
-bool Pipeline::resembles_background(const Rect& box, std::uint16_t label, int area) const noexcept {
-  const ShadowTest::Input in = shadow_input();
-  int alike = 0;
-  for_each_pixel(blobs_.labels, box, label,
-                 [&](int x, int y) { alike += shadow_test_->resembles_background(in, x, y) ? 1 : 0; });
-  return alike * 2 >= area;
+bool Pipeline::resembles_background(const Rect& box, std::uint16_t label, int area) noexcept {
+  return shadow_test_->count_resembling(shadow_input(), box, label) * 2 >= area;
 }
 
 void Pipeline::learn_background() noexcept {

@@ -111,7 +111,7 @@ class Pipeline {
   void renew_background_disparity() noexcept;
   void reject_background() noexcept;
   void measure_strength() noexcept;
-  [[nodiscard]] bool resembles_background(const Rect& box, std::uint16_t label, int area) const noexcept;
+  [[nodiscard]] bool resembles_background(const Rect& box, std::uint16_t label, int area) noexcept;
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;

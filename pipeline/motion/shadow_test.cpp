@@ -9,13 +9,16 @@ namespace stereotrack {
 
 namespace {
 
-constexpr int kReach = 2;
-constexpr int kBrightestPercent = 97;  // above, the light is the same
+constexpr int kVerdictRows = 2;  // of zeros above and below the picture
 
-template <class Fn>
-void for_each_neighbour(int x, int y, int width, int height, Fn&& fn) noexcept {
-  for (int v = std::max(y - kReach, 0); v <= std::min(y + kReach, height - 1); ++v) {
-    for (int u = std::max(x - kReach, 0); u <= std::min(x + kReach, width - 1); ++u) fn(u, v);
+/// Calls fn(from, to) for each run of pixels of [from, to) that are wanted.
+template <class Wanted, class Fn>
+void for_each_run(int from, int to, Wanted&& wanted, Fn&& fn) noexcept {
+  for (int x = from; x < to; ++x) {
+    if (!wanted(x)) continue;
+    const int begin = x;
+    while (x < to && wanted(x)) ++x;
+    fn(begin, x);
   }
 }
 
@@ -29,38 +32,38 @@ Result<ShadowTest> ShadowTest::create(const Config& config, int width, int heigh
   if (width < 1 || height < 1) return fail(Fault::kBadSize);
   ShadowTest self;
   self.config_ = config;
-  self.verdicts_ = arena.image<std::uint8_t>(width, height);
+  self.tolerances_ = {config.darkest_percent, config.chroma_tolerance, config.texture_tolerance};
+  const ImageView<std::int8_t> framed = arena.image<std::int8_t>(width + 2 * kVerdictFrame, height + 2 * kVerdictRows);
+  self.looks_ = arena.array<std::uint8_t>(static_cast<std::size_t>(width));
   if (arena.failed()) return fail(Fault::kOutOfMemory);
+  self.verdicts_ = framed.window(kVerdictFrame, kVerdictRows, width, height);
   return self;
 }
 
-bool ShadowTest::looks_like_background(const Input& in, int x, int y, int slack) const noexcept {
-  int now = 0;
-  int before = 0;
-  int count = 0;
-  for_each_neighbour(x, y, verdicts_.width, verdicts_.height, [&](int u, int v) {
-    now += in.y.at(u, v);
-    before += in.y_background.at(u, v);
-    ++count;
-  });
-  if (before == 0) return false;
-  const int ratio = static_cast<int>(static_cast<std::int64_t>(now) * 256 / before);
-  const std::uint16_t label = in.labels.at(x, y);
-  const bool weak = in.distance.at(x, y) * 100 < in.typical[label] * config_.weak_percent;
-  const bool darker = ratio * 100 * slack >= config_.darkest_percent * 256 && ratio * 100 < kBrightestPercent * 256;
-  const bool lit = slack > 1 && ratio < 2 * 256;  // stereo has spoken: it may be brighter, too
-  if (!weak && !darker && !lit) return false;
-  const auto chroma_kept = [&](int value, int background) {
-    return std::abs((value - 128) * 256 - (background - 128) * ratio) <= config_.chroma_tolerance * 256 * slack;
-  };
-  const bool colour_kept = in.cb.empty() || (chroma_kept(in.cb.at(x, y), in.cb_background.at(x, y)) &&
-                                             chroma_kept(in.cr.at(x, y), in.cr_background.at(x, y)));
-  int residual = 0;
-  for_each_neighbour(x, y, verdicts_.width, verdicts_.height, [&](int u, int v) {
-    residual += std::abs(in.y.at(u, v) * 256 - in.y_background.at(u, v) * ratio);
-  });
-  if (residual > (config_.texture_tolerance * 256 * slack) * count) return false;
-  return weak || colour_kept;
+void ShadowTest::look(const Input& in, int y, int from, int to) noexcept {
+  look_row({in.y, in.cb, in.cr, in.y_background, in.cb_background, in.cr_background}, tolerances_, y, from, to,
+           looks_.data());
+}
+
+bool ShadowTest::looks_like_background(const Input& in, int x, int y, bool wide) const noexcept {
+  const bool weak = in.distance.at(x, y) * 100 < in.typical[in.labels.at(x, y)] * config_.weak_percent;
+  const int sought = weak ? (wide ? kTextureWide : kTexture) : (wide ? kSameLookWide : kSameLook);
+  return (looks_[x] & sought) != 0;
+}
+
+int ShadowTest::count_resembling(const Input& in, const Rect& box, std::uint16_t label) noexcept {
+  const Rect part = intersect(box, {0, 0, verdicts_.width, verdicts_.height});
+  int alike = 0;
+  for (int y = part.top; y < part.bottom(); ++y) {
+    const std::uint16_t* labels = in.labels.row(y);
+    for_each_run(
+        part.left, part.right(), [&](int x) { return labels[x] == label; },
+        [&](int from, int to) {
+          look(in, y, from, to);
+          for (int x = from; x < to; ++x) alike += looks_like_background(in, x, y, true) ? 1 : 0;
+        });
+  }
+  return alike;
 }
 
 ShadowTest::Depth ShadowTest::depth_of(const Input& in, int x, int y) const noexcept {
@@ -82,41 +85,33 @@ void ShadowTest::weigh(const Input& in, int x, int y, Evidence& sum) const noexc
   }
 }
 
-ShadowTest::Verdict ShadowTest::judge(const Input& in, int x, int y) const noexcept {
-  switch (depth_of(in, x, y)) {
-    case Depth::kNear: return kObject;
-    case Depth::kBehind:
-      if (in.ghost[in.labels.at(x, y)] != 0) return kBackground;
-      break;
-    case Depth::kOwn: return looks_like_background(in, x, y, kOwnSlack) ? kBackground : kObject;
-    case Depth::kUnknown: break;
-  }
-  return looks_like_background(in, x, y, 1) ? kBackground : kObject;
+void ShadowTest::judge_row(const Input& in, int y, const std::uint8_t* mask) noexcept {
+  std::int8_t* verdicts = verdicts_.row(y);
+  const auto by_depth = [&](int x) {
+    switch (depth_of(in, x, y)) {
+      case Depth::kNear: return kObject;
+      case Depth::kBehind: return in.ghost[in.labels.at(x, y)] != 0 ? kBackground : kLook;
+      case Depth::kOwn: return kLookWide;
+      case Depth::kUnknown: break;
+    }
+    return kLook;
+  };
+  for (int x = 0; x < verdicts_.width; ++x) verdicts[x] = mask[x] == 0 ? kOutside : by_depth(x);
+  for_each_run(
+      0, verdicts_.width, [&](int x) { return verdicts[x] >= kLook; },
+      [&](int from, int to) {
+        look(in, y, from, to);
+        for (int x = from; x < to; ++x) {
+          verdicts[x] = looks_like_background(in, x, y, verdicts[x] == kLookWide) ? kBackground : kObject;
+        }
+      });
 }
 
 std::uint32_t ShadowTest::run(const Input& in, ImageView<std::uint8_t> mask) noexcept {
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      verdicts_.at(x, y) = mask.at(x, y) == 0 ? kOutside : judge(in, x, y);
-    }
-  }
-  std::uint32_t cleared = 0;
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      if (mask.at(x, y) == 0) continue;
-      int shadow = 0;
-      int object = 0;
-      for_each_neighbour(x, y, mask.width, mask.height, [&](int u, int v) {
-        shadow += verdicts_.at(u, v) == kBackground ? 1 : 0;
-        object += verdicts_.at(u, v) == kObject ? 1 : 0;
-      });
-      if (shadow > object) {
-        mask.at(x, y) = 0;
-        ++cleared;
-      }
-    }
-  }
-  return cleared;
+  for (int y = 0; y < mask.height; ++y) judge_row(in, y, mask.row(y));
+  int cleared = 0;
+  for (int y = 0; y < mask.height; ++y) cleared += clear_outvoted(verdicts_, y, mask.row(y));
+  return static_cast<std::uint32_t>(cleared);
 }
 
 }  // namespace stereotrack

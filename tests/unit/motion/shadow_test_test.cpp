@@ -240,10 +240,12 @@ TEST(ShadowTest, ResemblesTheBackgroundUnderDarkerAndBrighterLight) {
   Scene scene;
   for (double ratio : {0.5, 1.0, 1.3}) {
     scene.y = scaled(scene.y_background, ratio);
-    EXPECT_TRUE(stage->resembles_background(scene.input(), 20, 20)) << ratio;
+    EXPECT_EQ(stage->count_resembling(scene.input(), {0, 0, kSize.width, kSize.height}, 1), kRegion.area()) << ratio;
+    EXPECT_EQ(stage->count_resembling(scene.input(), {-5, kRegion.y + 1, 500, 2}, 1), 2 * kRegion.width);
+    EXPECT_EQ(stage->count_resembling(scene.input(), {0, 0, kSize.width, kSize.height}, 2), 0);
   }
   scene.y = random_plane(kSize, 90, 190, 2);
-  EXPECT_FALSE(stage->resembles_background(scene.input(), 20, 20));
+  EXPECT_EQ(stage->count_resembling(scene.input(), {0, 0, kSize.width, kSize.height}, 1), 0);
 }
 
 TEST(ShadowTest, VoteClearsAFewObjectPixelsInAShadowAndKeepsAFewShadowPixelsInAnObject) {
