@@ -1,32 +1,15 @@
 #include "pipeline/shape/run_length.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <cstring>
+
+#include "pipeline/shape/bits_kernel.hpp"
 
 namespace stereotrack {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the first pixel must be a word's lowest byte");
-
-/// Bit i: pixels[i] is set, for eight pixels.
-std::uint64_t bits_of_eight(const std::uint8_t* pixels) noexcept {
-  std::uint64_t bytes;
-  std::memcpy(&bytes, pixels, sizeof bytes);
-  bytes |= bytes >> 4;
-  bytes |= bytes >> 2;
-  bytes |= bytes >> 1;  // each byte's lowest bit is now the OR of its eight
-  return ((bytes & 0x0101010101010101U) * 0x0102040810204080U) >> 56;
-}
-
-/// Bit i: pixels[i] is set, for the next 64 pixels, or the `count` that are left.
-std::uint64_t bits_of(const std::uint8_t* pixels, int count) noexcept {
-  std::uint64_t bits = 0;
-  int i = 0;
-  for (; i + 8 <= std::min(count, 64); i += 8) bits |= bits_of_eight(pixels + i) << i;
-  for (; i < std::min(count, 64); ++i) bits |= static_cast<std::uint64_t>(pixels[i] != 0) << i;
-  return bits;
-}
+constexpr int kChunk = 64;  // words of bits taken at a time
 
 void join(std::span<Run> runs, std::int32_t a, std::int32_t b) noexcept {
   a = root_of(runs, a);
@@ -41,6 +24,7 @@ RunCount find_components(ImageView<const std::uint8_t> mask, RunKind kind, std::
   const std::int32_t reach = object ? 1 : 0;  // 8-connected runs also touch diagonally
   RunCount count;
   const auto capacity = static_cast<std::int32_t>(runs.size());
+  std::array<std::uint64_t, kChunk + 1> words;
   std::int32_t previous = 0;  // first run of the row above
   for (int y = 0; y < mask.height; ++y) {
     const std::uint8_t* row = mask.row(y);
@@ -62,7 +46,9 @@ RunCount find_components(ImageView<const std::uint8_t> mask, RunKind kind, std::
     };
     for (int x = 0; x < mask.width; x += 64) {
       const int left = mask.width - x;
-      std::uint64_t bits = bits_of(row + x, left) ^ (object ? 0 : ~std::uint64_t{0});
+      const int word = x / 64 % kChunk;
+      if (word == 0) row_bits(row + x, std::min(left, 64 * kChunk), words.data());
+      std::uint64_t bits = words[static_cast<std::size_t>(word)] ^ (object ? 0 : ~std::uint64_t{0});
       if (left < 64) bits &= (std::uint64_t{1} << left) - 1;
       for (std::uint64_t edges = bits ^ (bits << 1 | before); edges != 0; edges &= edges - 1) {
         toggle(x + std::countr_zero(edges));
