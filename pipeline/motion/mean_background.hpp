@@ -21,7 +21,7 @@ class MeanBackground {
     if (width < 1 || height < 1) return fail(Fault::kBadSize);
     MeanBackground self;
     self.frames_ = frames;
-    self.sum_ = arena.image<std::uint32_t>(width, height);
+    self.sum_ = arena.image<std::int32_t>(width, height);
     self.mean_ = arena.image<std::uint8_t>(width, height);
     if (arena.failed()) return fail(Fault::kOutOfMemory);
     return self;
@@ -31,14 +31,18 @@ class MeanBackground {
   void learn(ImageView<const std::uint8_t> picture) noexcept {
     if (seen_ >= frames_) return;
     ++seen_;
-    const auto n = static_cast<std::uint32_t>(seen_);
+    // In floats, which compilers divide several at a time. Exact: numerator and divisor are below 2^24, and a quotient
+    // under a whole number is so by 1/n > 2^-16 at least, where a float up to 256 is rounded by at most 2^-17.
+    const auto n = static_cast<float>(seen_);
+    const std::int32_t half = seen_ / 2;
+    const int width = mean_.width;  // bytes may alias members, locals not: without this nothing is vectorised
     for (int y = 0; y < mean_.height; ++y) {
       const std::uint8_t* in = picture.row(y);
-      std::uint32_t* sum = sum_.row(y);
+      std::int32_t* sum = sum_.row(y);
       std::uint8_t* mean = mean_.row(y);
-      for (int x = 0; x < mean_.width; ++x) {
+      for (int x = 0; x < width; ++x) {
         sum[x] += in[x];
-        mean[x] = static_cast<std::uint8_t>((sum[x] + n / 2) / n);
+        mean[x] = static_cast<std::uint8_t>(static_cast<int>(static_cast<float>(sum[x] + half) / n));
       }
     }
   }
@@ -51,7 +55,7 @@ class MeanBackground {
  private:
   int frames_ = 0;
   int seen_ = 0;
-  ImageView<std::uint32_t> sum_;
+  ImageView<std::int32_t> sum_;
   ImageView<std::uint8_t> mean_;
 };
 

@@ -45,6 +45,28 @@ TEST(MeanBackground, IsFrozenAfterK) {
   EXPECT_EQ(background->seen(), 2);
 }
 
+TEST(MeanBackground, EveryNumberOfPicturesIsDividedExactly) {
+  constexpr int kColumns = 64;
+  Arena arena;
+  auto background = MeanBackground::create(65535, kColumns, 1, arena);
+  ASSERT_TRUE(background.has_value());
+  std::array<int, kColumns> sum{};
+  Plane picture(1, kColumns);
+  int wrong = 0;
+  for (int n = 1; n <= 65535; ++n) {
+    // A column that is all white, one that is black but for a pixel now and then, and everything between.
+    for (int x = 0; x < kColumns; ++x) {
+      picture(0, x) = static_cast<std::uint8_t>(x == 0 ? 255 : (n * (x + 3) + x * x * 37) % (4 * x + 1));
+      sum[static_cast<std::size_t>(x)] += picture(0, x);
+    }
+    background->learn(view(picture));
+    for (int x = 0; x < kColumns; ++x) {
+      wrong += background->mean().at(x, 0) != (sum[static_cast<std::size_t>(x)] + n / 2) / n ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
 TEST(MeanBackground, RandomPicturesAgreeWithTheMeanInDoublePrecision) {
   Arena arena;
   const cv::Size size(33, 7);
