@@ -99,6 +99,7 @@ class Refused(unittest.TestCase):
 
     def test_header_without_guard(self):
         self.refuses("guard", {"config/a.hpp": "int a();\n"})
+        self.assertFalse(check({"pipeline/a-inl.hpp": "#if defined(A) == defined(HWY_TARGET_TOGGLE)\n#endif\n"}))
 
     def test_tests_that_no_list_names(self):
         self.refuses("unregistered-test", {"tests/unit/x/a_test.cpp": "int a;\n", "tests/unit/x/CMakeLists.txt": "\n"})
