@@ -4,6 +4,7 @@
 #include <span>
 
 #include "pipeline/core/arena.hpp"
+#include "pipeline/stereo/census_kernel.hpp"
 #include "pipeline/stereo/disparity.hpp"
 #include "pipeline/stereo/disparity_filter.hpp"
 
@@ -28,8 +29,9 @@ namespace stereotrack {
 /// Faults: kBadConfig, kOutOfMemory at create(); kBadSize (pictures or mask of another size), kBadConfig
 /// (range outside the stated maximum) at run, `out` then untouched.
 /// Cost: O(1) a pixel and disparity whatever the block: one Hamming distance, two column sums into the window,
-/// one comparison for the right view. A region costs (area + its margin of half a block) x range.
-/// Memory: (block + 2) bytes x width x largest range, 12 bytes a pixel for the filter. One instance a thread.
+/// one comparison for the right view; in vector lanes, see census_kernel.hpp. A region costs (area + its margin of half
+/// a block) x range, in memory too.
+/// Memory: (block + 2) bytes x width x largest range, 20 bytes a pixel for the filter. One instance a thread.
 class CensusMatcher {
  public:
   struct Config {
@@ -62,38 +64,11 @@ class CensusMatcher {
                                                    ImageView<std::uint16_t> out) noexcept;
 
  private:
-  /// What the winner-takes-all step knows of a pixel until its row is complete.
-  struct Match {
-    std::uint16_t lane;   ///< best d - range.min
-    std::uint16_t value;  ///< disparity [1/16 px]
-    std::uint8_t state;   ///< see census_matcher.cpp
-  };
-  struct Pictures {
-    ImageView<const std::uint8_t> left;
-    ImageView<const std::uint8_t> right;
-  };
-
   CensusMatcher() noexcept = default;
-  void enter_row(const BlockGeometry& geometry, const Pictures& pictures, Span columns, int y, int first_row) noexcept;
-  void leave_row(const BlockGeometry& geometry, const Pictures& pictures, Span columns, int y, int first_row) noexcept;
-  void match_row(const BlockGeometry& geometry, Span span, int rows, ImageView<const std::uint8_t> mask,
-                 int y) noexcept;
-  [[nodiscard]] Match match(const BlockGeometry& geometry, int x, int rows, std::uint32_t gradient) noexcept;
-  const std::uint16_t* window_costs(const BlockGeometry& geometry, int x, int first, int last) noexcept;
 
   Config config_;
-  int lanes_ = 0;                            ///< disparities of the running call
-  std::span<std::uint8_t> distances_;        ///< [row modulo block][left column][disparity]
-  std::span<std::uint16_t> column_sums_;     ///< [left column][disparity], over the rows of the window
-  std::span<std::uint16_t> window_sums_;     ///< [disparity]
-  std::span<std::uint16_t> scaled_sums_;     ///< [disparity], where windows are clipped
-  std::span<std::uint32_t> gradient_sums_;   ///< [left column], over the rows of the window
-  std::span<std::uint32_t> left_codes_;      ///< one row
-  std::span<std::uint32_t> reversed_codes_;  ///< one row of the right picture, last column first
-  std::span<std::uint16_t> right_costs_;     ///< best cost of each right pixel of the row, last column first
-  std::span<std::uint16_t> right_lanes_;     ///< and where it was found
-  std::span<Match> matches_;                 ///< one row
-  std::span<std::uint8_t> used_columns_;     ///< [left column]
+  CensusScratch scratch_;
+  std::span<Span> spans_;  ///< of the rows of the running call
   ImageView<std::uint16_t> raw_;
   DisparityFilter filter_;
 };

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
+#include <span>
 
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
@@ -68,18 +70,12 @@ struct BlockGeometry {
   /// The same without the right picture's limits.
   [[nodiscard]] int columns(int x) const noexcept { return right_end(x) - left_end(x) + 1; }
 
-  /// Where the partner of (x, range.min) stands in a right row that is stored from its last column to its
-  /// first, so that rising disparities are neighbours in memory. May lie outside; first() and last() do not.
-  [[nodiscard]] std::ptrdiff_t reversed(int x) const noexcept {
-    return std::ptrdiff_t{right_width} - 1 - x + offset + range.min;
-  }
-
  private:
   [[nodiscard]] int left_end(int x) const noexcept { return std::max(x - radius, 0); }
   [[nodiscard]] int right_end(int x) const noexcept { return std::min(x + radius, left_width - 1); }
 };
 
-/// Pixels of `row` between [first, last] that are wanted; empty (first > last) if none is.
+/// Pixels [first, last] of a row; empty (first > last) if there is none.
 struct Span {
   int first = 0;
   int last = -1;
@@ -91,24 +87,50 @@ struct Span {
   return mask.empty() || mask.at(x, y) != 0;
 }
 
+/// From the first to the last wanted pixel of a row of `roi`.
 [[nodiscard]] inline Span wanted_span(const ImageView<const std::uint8_t>& mask, const Rect& roi, int y) noexcept {
   Span span{roi.left, roi.right() - 1};
+  if (mask.empty()) return span;
+  // Most of a row may be unwanted, so eight pixels are asked at a time.
+  const auto eight_unwanted = [row = mask.row(y)](int x) {
+    std::uint64_t eight;
+    std::memcpy(&eight, row + x, sizeof eight);
+    return eight == 0;
+  };
+  while (span.last - span.first >= 8 && eight_unwanted(span.first)) span.first += 8;
   while (!span.empty() && !is_wanted(mask, span.first, y)) ++span.first;
+  while (span.last - span.first >= 8 && eight_unwanted(span.last - 7)) span.last -= 8;
   while (!span.empty() && !is_wanted(mask, span.last, y)) --span.last;
   return span;
 }
 
-/// Marks in `used` (one flag a left column) the columns that some window of a wanted pixel covers.
-inline void mark_window_columns(const ImageView<const std::uint8_t>& mask, const Rect& roi, int radius, int width,
-                                std::uint8_t* used) noexcept {
-  std::fill_n(used, width, std::uint8_t{0});
+/// The wanted pixels of a region, row by row.
+struct WantedRows {
+  Rect box;                     ///< tight around them; empty if there is none
+  std::span<const Span> spans;  ///< of the rows of `box`
+
+  [[nodiscard]] Span span(int y) const noexcept { return spans[static_cast<std::size_t>(y - box.top)]; }
+};
+
+/// `roi` lies in the picture. `memory`: at least one Span for each of its rows; the answer lives there.
+[[nodiscard]] inline WantedRows find_wanted(const ImageView<const std::uint8_t>& mask, const Rect& roi,
+                                            std::span<Span> memory) noexcept {
+  int left = roi.right();
+  int right = roi.left;
+  int top = roi.bottom();
+  int bottom = roi.top;
   for (int y = roi.top; y < roi.bottom(); ++y) {
     const Span span = wanted_span(mask, roi, y);
+    memory[static_cast<std::size_t>(y - roi.top)] = span;
     if (span.empty()) continue;
-    const int begin = std::max(span.first - radius, 0);
-    const int end = std::min(span.last + radius, width - 1);
-    std::fill(used + begin, used + end + 1, std::uint8_t{1});
+    left = std::min(left, span.first);
+    right = std::max(right, span.last + 1);
+    top = std::min(top, y);
+    bottom = y + 1;
   }
+  if (top >= bottom) return {};
+  return {{left, top, right - left, bottom - top},
+          memory.subspan(static_cast<std::size_t>(top - roi.top), static_cast<std::size_t>(bottom - top))};
 }
 
 }  // namespace stereotrack

@@ -19,7 +19,8 @@ namespace stereotrack {
 ///
 /// In: 1/16 px, kNoDisparity = none, at most the size of create(); `mask` of the same size or empty. Out: all
 /// wanted pixels are written, no others. Adds matched, speckle and filled to `counts`.
-/// O(pixels). Memory: 12 bytes a pixel. One instance a thread.
+/// O(pixels). Memory: 18 bytes a pixel. Faults at create(): kBadConfig (sides over 8192), kOutOfMemory. One instance a
+/// thread.
 class DisparityFilter {
  public:
   struct Config {
@@ -36,16 +37,27 @@ class DisparityFilter {
            DisparityCounts& counts) noexcept;
 
  private:
-  void median(ImageView<const std::uint16_t> in, ImageView<std::uint16_t> out) const noexcept;
+  struct Start {
+    std::int16_t x;
+    std::int16_t y;
+  };
+
   [[nodiscard]] std::int64_t remove_speckles(ImageView<std::uint16_t> picture) noexcept;
   [[nodiscard]] std::int64_t fill_gaps(ImageView<const std::uint8_t> mask,
                                        ImageView<std::uint16_t> picture) const noexcept;
-  [[nodiscard]] std::int32_t root(std::int32_t pixel) noexcept;
+  [[nodiscard]] std::int32_t find_runs(ImageView<const std::uint16_t> picture) noexcept;
+  [[nodiscard]] std::int32_t root(std::int32_t run) noexcept;
+  void join(std::int32_t a, std::int32_t b) noexcept;
 
   Config config_;
   ImageView<std::uint16_t> work_;
-  std::span<std::int32_t> parents_;  ///< union-find over the pixels of the picture
-  std::span<std::int32_t> sizes_;    ///< of the island, at its root
+  std::span<std::uint16_t> none_row_;  ///< a row without disparities
+  // Islands are made of runs: neighbours in a row that belong together.
+  std::span<std::int32_t> run_of_;   ///< [row modulo 2][column]
+  std::span<Start> starts_;          ///< [run]
+  std::span<std::int32_t> lengths_;  ///< [run]
+  std::span<std::int32_t> parents_;  ///< [run] union-find
+  std::span<std::int32_t> sizes_;    ///< of the island [px], at its root
 };
 
 }  // namespace stereotrack

@@ -5,6 +5,7 @@
 
 #include "pipeline/core/arena.hpp"
 #include "pipeline/stereo/disparity.hpp"
+#include "pipeline/stereo/sad_kernel.hpp"
 
 namespace stereotrack {
 
@@ -21,7 +22,8 @@ namespace stereotrack {
 /// Faults: kBadConfig, kOutOfMemory at create(); kBadSize (pictures or mask of another size), kBadConfig
 /// (range outside the stated maximum) at run, `out` then untouched.
 /// Cost: O(1) a pixel and disparity whatever the block: two absolute differences into the column sums, two
-/// column sums into the window. A region costs (area + its margin of half a block) x range.
+/// column sums into the window; in vector lanes, see sad_kernel.hpp. Blocks over kLargestSadLaneBlock take the plain
+/// way, some fifty times slower. A region costs (area + its margin of half a block) x range, in memory too.
 /// Memory: 2 bytes x width x largest range. One instance a thread.
 class SadMatcher {
  public:
@@ -50,16 +52,10 @@ class SadMatcher {
 
  private:
   SadMatcher() noexcept = default;
-  void change_row(const BlockGeometry& geometry, const std::uint8_t* left, const std::uint8_t* right, Span columns,
-                  bool enters) noexcept;
-  [[nodiscard]] int best_disparity(const BlockGeometry& geometry, int x) const noexcept;
 
   Config config_;
-  int lanes_ = 0;                           ///< disparities of the running call
-  std::span<std::uint16_t> column_sums_;    ///< [left column][disparity], over the rows of the window
-  std::span<std::uint32_t> window_sums_;    ///< [disparity]
-  std::span<std::uint8_t> reversed_right_;  ///< one right row, last column first
-  std::span<std::uint8_t> used_columns_;    ///< [left column]
+  SadScratch scratch_;
+  std::span<Span> spans_;  ///< of the rows of the running call
 };
 
 }  // namespace stereotrack
