@@ -16,6 +16,7 @@ namespace stereotrack::bench {
 Side side_of(const Measured& measured, const Plan& plan) {
   Side side;
   side.ms = times_of(measured.ms);
+  side.wall_ms = times_of(measured.wall_ms);
   side.allocations = measured.allocations;
   side.instructions = measured.instructions;
   const auto counted = plan.instructions.find(measured.name);
@@ -56,9 +57,9 @@ void count_with_callgrind(Plan& plan, Report& report) {
         "build again");
   }
   std::ifstream file(json);
+  plan.counted_on = nlohmann::json::parse(file)["machine"]["simd"].get<std::string>();
   report.instructions_by = "callgrind";
-  report.instructions_why =
-      "whose CPU has SIMD target " + nlohmann::json::parse(file)["machine"]["simd"].get<std::string>() + " at best";
+  report.instructions_why = "whose CPU has SIMD target " + plan.counted_on + " at best";
 }
 
 int run(const Arguments& arguments) {

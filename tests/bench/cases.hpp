@@ -11,8 +11,9 @@ struct Plan {
   int frames = 200;   ///< timed calls of each contestant; a third of them at 1280x800 when quick
   int warm_up = 100;  ///< untimed ones before, in which backgrounds are learnt
   bool quick = false;
-  /// By contestant, counted elsewhere; wins over none.
+  /// By contestant, counted by another run of this program; wins over none.
   std::map<std::string, double> instructions;
+  std::string counted_on;  ///< its best SIMD target
 };
 
 /// What a contestant of a contest took, with instructions that were counted elsewhere.

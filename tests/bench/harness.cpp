@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 #include <stdexcept>
 
 #include "firmware-app/runtime/allocation_count.hpp"
@@ -25,16 +27,18 @@ namespace stereotrack::bench {
 
 namespace {
 
-double ms_since(std::chrono::steady_clock::time_point start) noexcept {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
 double percentile(const std::vector<double>& sorted, double percent) {
   const auto rank = static_cast<std::size_t>(std::ceil(percent / 100 * static_cast<double>(sorted.size())));
   return sorted[std::clamp<std::size_t>(rank, 1, sorted.size()) - 1];
 }
 
 }  // namespace
+
+double thread_ms() noexcept {
+  timespec now{};
+  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
 
 Times times_of(std::vector<double> ms) {
   std::sort(ms.begin(), ms.end());
@@ -47,13 +51,13 @@ StageClock::StageClock(std::vector<std::string> names) : names_(std::move(names)
 
 void StageClock::begin(bool records) noexcept {
   records_ = records;
-  last_ = std::chrono::steady_clock::now();
+  last_ = thread_ms();
 }
 
 void StageClock::ended(std::size_t stage) noexcept {
-  const auto now = std::chrono::steady_clock::now();
+  const double now = thread_ms();
   if (records_ && ms_[stage].size() < ms_[stage].capacity()) {
-    ms_[stage].push_back(std::chrono::duration<double, std::milli>(now - last_).count());
+    ms_[stage].push_back(now - last_);
   }
   last_ = now;
 }
@@ -93,6 +97,7 @@ void Contest::add(std::string name, std::function<void()> work, StageClock* stag
 void Contest::reserve(std::size_t rounds) {
   for (Contestant& contestant : contestants_) {
     contestant.measured.ms.reserve(rounds);
+    contestant.measured.wall_ms.reserve(rounds);
     if (contestant.stages != nullptr) contestant.stages->reserve(rounds);
   }
 }
@@ -112,9 +117,11 @@ void Contest::call(Contestant& contestant, bool records) {
   }
   const std::uint64_t instructions_before = counter_.count();
   const std::uint64_t allocations_before = allocations_of_this_thread();
-  const auto start = std::chrono::steady_clock::now();
+  const auto wall_start = std::chrono::steady_clock::now();
+  const double start = thread_ms();
   contestant.work();
-  const double ms = ms_since(start);
+  const double ms = thread_ms() - start;
+  const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - wall_start;
   const std::uint64_t allocations = allocations_of_this_thread() - allocations_before;
   const std::uint64_t instructions = counter_.count() - instructions_before;
   if (dumps) {
@@ -124,6 +131,7 @@ void Contest::call(Contestant& contestant, bool records) {
   if (!records) return;
   Measured& measured = contestant.measured;
   measured.ms.push_back(ms);
+  measured.wall_ms.push_back(wall.count());
   const auto calls = static_cast<double>(measured.ms.size());
   measured.allocations += (static_cast<double>(allocations) - measured.allocations) / calls;
   if (counter_.works()) {
@@ -148,9 +156,9 @@ double copy_bandwidth() {
   std::vector<char> to(kBytes, 2);
   std::vector<double> gigabytes_a_second;
   for (int i = 0; i < kTimes; ++i) {
-    const auto start = std::chrono::steady_clock::now();
+    const double start = thread_ms();
     std::memcpy(to.data(), from.data(), kBytes);
-    gigabytes_a_second.push_back(2.0 * kBytes / 1e6 / ms_since(start));
+    gigabytes_a_second.push_back(2.0 * kBytes / 1e6 / (thread_ms() - start));
   }
   return median_of(std::move(gigabytes_a_second));
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -9,6 +8,11 @@
 #include <vector>
 
 namespace stereotrack::bench {
+
+/// Times are those for which the calling thread had the CPU: what else the machine does at the same time lengthens
+/// caches' misses, but not the time that somebody else computes. All contestants work in one thread; the time on the
+/// wall is kept beside it, and would show who does not.
+[[nodiscard]] double thread_ms() noexcept;
 
 /// Of a set of times [ms].
 struct Times {
@@ -33,7 +37,7 @@ class StageClock {
  private:
   std::vector<std::string> names_;
   std::vector<std::vector<double>> ms_;  ///< [stage][call]
-  std::chrono::steady_clock::time_point last_;
+  double last_ = 0;                      ///< [ms]
   bool records_ = false;
 };
 
@@ -57,6 +61,7 @@ class InstructionCounter {
 struct Measured {
   std::string name;
   std::vector<double> ms;              ///< each timed call
+  std::vector<double> wall_ms;         ///< likewise
   double allocations = 0;              ///< heap calls, mean of the timed calls
   std::optional<double> instructions;  ///< mean of the timed calls
   const StageClock* stages = nullptr;  ///< of whoever has any

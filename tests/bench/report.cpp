@@ -51,6 +51,7 @@ Json json_of(const Entry& entry) {
   for (const auto& [name, side] : {std::pair{"ours", &entry.ours}, std::pair{"theirs", &entry.theirs}}) {
     Json& detail = json["detail"][name];
     detail = json_of(side->ms);
+    detail["wall"] = json_of(side->wall_ms);
     detail["allocations"] = allocations_are_counted() ? Json(side->allocations) : Json(nullptr);
     detail["instructions"] = or_null(side->instructions);
     if (side->targets) detail["targets"] = *side->targets;
@@ -196,7 +197,7 @@ std::string setting(const Report& report) {
                      ", best SIMD target " + machine.simd + ".\n* OpenCV " + opencv.version + ": " + opencv.build +
                      ".\n* " + std::to_string(report.frames) + " timed calls after " + std::to_string(report.warm_up) +
                      " others" + (report.quick ? ", fewer where pictures are large (--quick)" : "") +
-                     "; times in ms.\n* memcpy moves " + number(report.copy_gb_s) +
+                     "; ms of CPU time of the one thread.\n* memcpy moves " + number(report.copy_gb_s) +
                      " GB/s, read and written; \"used\" counts what any program must read and write, once.\n";
   text += report.instructions_by.empty()
               ? "* Instructions are not counted: " + report.instructions_why + ".\n"

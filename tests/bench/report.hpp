@@ -13,6 +13,7 @@ namespace stereotrack::bench {
 /// One side of an entry.
 struct Side {
   Times ms;
+  Times wall_ms;
   double allocations = 0;              ///< heap calls a call
   std::optional<double> instructions;  ///< a call
   std::optional<int> targets;          ///< confirmed and seen in the last frame: that both do the work

@@ -59,6 +59,9 @@ class Contract(unittest.TestCase):
                 detail = entry["detail"][side]
                 self.assertEqual(detail["p50"], entry[side], name)
                 self.assert_ordered(detail, name)
+                self.assert_ordered(detail["wall"], name)
+                # One thread cannot have the CPU for longer than the clock on the wall says.
+                self.assertLessEqual(detail["max"], detail["wall"]["max"] * 1.02 + 0.1, name)
                 self.assert_positive(detail["gb_per_s"], name)
                 self.assertAlmostEqual(detail["gb_per_s"] * entry[side] * 1e6 / entry["bytes"], 1, 6, name)
             self.assertAlmostEqual(entry["ratio"] * entry["ours"] / entry["theirs"], 1, 9, name)
