@@ -11,7 +11,7 @@ struct Plan {
   int frames = 200;   ///< timed calls of each contestant; a third of them at 1280x800 when quick
   int warm_up = 100;  ///< untimed ones before, in which backgrounds are learnt
   bool quick = false;
-  /// By contestant, counted by another run of this program; wins over none.
+  /// By contestant, counted by another run of this program: taken where the CPU gave no count.
   std::map<std::string, double> instructions;
   std::string counted_on;  ///< its best SIMD target
 };

@@ -280,8 +280,8 @@ void OpenCvPipeline::follow_features(Target& target, double dt) {
     cv::Point place;
     cv::minMaxLoc(score_, &least, nullptr, &place, nullptr);
     if (least > kMostDifference * kMostDifference * kPatch * kPatch) return true;
-    const cv::Matx21f found(static_cast<float>(window.x + place.x + kPatch / 2),
-                            static_cast<float>(window.y + place.y + kPatch / 2));
+    const cv::Point middle = window.tl() + place + cv::Point(kPatch / 2, kPatch / 2);
+    const cv::Matx21f found(static_cast<float>(middle.x), static_cast<float>(middle.y));
     feature.filter.correct(cv::Mat(found, false));
     return false;
   });

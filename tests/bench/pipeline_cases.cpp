@@ -51,6 +51,7 @@ Stage stage_of(CvStep step) noexcept {
 
 config::Configuration configured(const std::vector<std::string>& settings) {
   std::vector<config::Layer> layers;
+  layers.reserve(settings.size());
   for (const std::string& setting : settings) layers.push_back(config::override_layer(setting));
   return config::load(layers).configuration;
 }

@@ -49,6 +49,7 @@ class Program {
   explicit Program(std::vector<std::string> command, ProgramOptions options = {})
       : options_(std::move(options)), start_(Clock::now()) {
     std::vector<char*> arguments;
+    arguments.reserve(command.size() + 1);
     for (std::string& word : command) arguments.push_back(word.data());
     arguments.push_back(nullptr);
     const std::string out = (folder_ / "out").string();
