@@ -11,6 +11,7 @@
 #include "firmware-app/stereotrack/monitor.hpp"
 #include "firmware-app/stereotrack/replay.hpp"
 #include "firmware-app/stereotrack/synth.hpp"
+#include "pipeline/core/simd.hpp"
 
 namespace {
 
@@ -28,10 +29,23 @@ void add_rig_options(CLI::App& command, stereotrack::RigArguments& rig) {
   command.add_option("--set", rig.set, "KEY=VALUE, wins over the file; may be given again")->allow_extra_args(false);
 }
 
+// Kernels use the best instruction set of the machine unless one is named; results are the same with each.
+void choose_simd(const std::string& name) {
+  std::string known = "best";
+  for (const stereotrack::SimdTarget target : stereotrack::simd_targets()) {
+    if (name == to_string(target) && use_simd(target)) return;
+    known += std::string(", ") + to_string(target);
+  }
+  if (name != "best") throw stereotrack::config::Error("--simd " + name + ": this machine has " + known);
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Tracks moving objects in stereo recordings.", "stereotrack");
   app.set_version_flag("--version", std::string("stereotrack ") + STEREOTRACK_VERSION);
   app.require_subcommand(1);
+  app.fallthrough();
+  std::string simd = "best";
+  app.add_option("--simd", simd, "instruction set of the kernels: best, scalar, sse4, avx2, avx512, neon");
 
   stereotrack::ReplayArguments replay;
   std::string replay_frames;
@@ -86,6 +100,7 @@ int run(int argc, char** argv) {
     std::cerr << "stereotrack: " << error.what() << " (see stereotrack --help)\n";
     return kBadUsage;
   }
+  choose_simd(simd);
   if (*replay_command) {
     replay.real_time = pace == "real";
     if (!replay_frames.empty()) replay.frames = stereotrack::parse_frames(replay_frames);

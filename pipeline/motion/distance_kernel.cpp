@@ -17,7 +17,7 @@ namespace stereotrack {
 namespace {
 
 constexpr int kStepsPerSd = AdaptiveBackground::kStepsPerSd;
-constexpr int kGainDarkest = 20 * 256;     // below, the ratio is mostly noise [8.8]
+constexpr int kGainDarkest = 20 * 256;  // below, the ratio is mostly noise [8.8]
 // From here on a pixel is clipped: it says no more than that it is at least so bright [8.8].
 constexpr int kClipped = 250 * 256;
 constexpr int kNowDarkest = 4;
@@ -142,8 +142,8 @@ void distance(const DistanceRow& in, int width, std::uint8_t* out) {
     const auto mean = mean_of(in.y, x);
     const auto expected = hn::ShiftRight<8>(hn::Mul(mean, gain));
     const auto is_clipped = hn::Lt(unclipped, hn::Max(mean, expected));
-    const auto apart = hn::Max(hn::Sub(hn::Min(expected, clipped), now),
-                               hn::Sub(now, hn::IfThenElse(is_clipped, white, expected)));
+    const auto apart =
+        hn::Max(hn::Sub(hn::Min(expected, clipped), now), hn::Sub(now, hn::IfThenElse(is_clipped, white, expected)));
     const auto luma = in_steps(hn::Max(hn::Sub(apart, tolerance), hn::Zero(di)), in.y, x);
     auto sum = luma;
     if (colour) {

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "drivers/telemetry/receiver.hpp"
+#include "pipeline/core/simd.hpp"
 #include "tests/replay/command_support.hpp"
 
 namespace stereotrack::test {
@@ -94,6 +95,19 @@ TEST_P(Determinism, ShorterRunGivesTheRowsOfTheWholeOneUpToItsEnd) {
     EXPECT_TRUE(datagrams.starts_with(read_text(out / "telemetry.bin"))) << end;
   }
   EXPECT_GT(compared, 20U);
+}
+
+TEST_P(Determinism, EachInstructionSetGivesTheSameBytes) {
+  ASSERT_GE(simd_targets().size(), 2U) << "this machine has but the plain references";
+  std::vector<std::string> arguments = preset_;
+  replay(sequence_.string(), folder_ / "best", arguments);
+  for (const SimdTarget target : simd_targets()) {
+    SCOPED_TRACE(to_string(target));
+    arguments = preset_;
+    arguments.insert(arguments.end(), {"--simd", to_string(target)});
+    replay(sequence_.string(), folder_ / to_string(target), arguments);
+    expect_same_results(folder_ / "best", folder_ / to_string(target));
+  }
 }
 
 TEST_P(Determinism, PicturesAreTheSame) {
