@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -79,6 +80,36 @@ TEST(Figures, ConveyorBoxKeepsOneIdentityOnAStraightPath) {
   const score::PathFit line = score::fit_path(straight.points, score::kStraight);
   EXPECT_LE(line.rms_3d, 0.07);                     // reached: 0.069 squares; the target itself
   EXPECT_NEAR(line.velocity.norm(), 0.173, 0.012);  // reached: 0.166 squares a frame
+}
+
+/// conveyor_box.csv: the box in the raw left picture, its edges read off enlarged crops by eye, good to about 1 px.
+TEST(Figures, ConveyorBoxHasTheSizeMeasuredByHand) {
+  NEEDS_RECORDING("dtu_conveyor_stereo");
+  const fs::path source = kData / "dtu_conveyor_stereo";
+  const TempDir dir;
+  std::vector<MotRow> rows;
+  ASSERT_NO_FATAL_FAILURE(replay(dir, source.string(), source / "derived_stereo_calibration.yml", rows, "1:250"));
+  const std::vector<MotRow> measured = evaluation::read_mot(STEREOTRACK_SOURCE_DIR "/tests/replay/conveyor_box.csv");
+  ASSERT_EQ(measured.size(), 15U);
+  const score::PathScore box = score::follow(rows, {.first_frame = 106, .last_frame = 250, .id = {}});
+
+  const auto within_a_tenth = [](double tracked, double truth) { return std::abs(tracked - truth) <= 0.1 * truth; };
+  std::size_t widths = 0;
+  std::size_t heights = 0;
+  std::size_t overlaps = 0;
+  for (const MotRow& truth : measured) {
+    SCOPED_TRACE(truth.frame);
+    const auto row = std::find_if(rows.begin(), rows.end(), [&](const MotRow& candidate) {
+      return candidate.frame == truth.frame && candidate.id == box.id;
+    });
+    ASSERT_NE(row, rows.end());
+    widths += within_a_tenth(row->box.width, truth.box.width) ? 1U : 0U;
+    heights += within_a_tenth(row->box.height, truth.box.height) ? 1U : 0U;
+    overlaps += evaluation::overlap(row->box, truth.box) >= 0.8 ? 1U : 0U;
+  }
+  EXPECT_EQ(widths, 15U);    // reached on 2026-11-22: 15, within 3 %; the target itself
+  EXPECT_GE(heights, 8U);    // reached: 9; target: 15. The belt mirrors the box under its front: up to 24 % too high
+  EXPECT_GE(overlaps, 13U);  // reached: 14; target: 15
 }
 
 TEST(Figures, EachPassUnderTheCeilingCameraHasATrack) {
