@@ -8,16 +8,15 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "drivers/capture/replay/silence.hpp"
 #include "firmware-app/render/matroska.hpp"
 
 namespace stereotrack::render {
@@ -47,14 +46,6 @@ std::string lower_extension(const fs::path& path) {
                                                               : "choose a place for --render that is writable");
 }
 
-/// As the readers of pictures do: errors are told by us, once, and not by libraries in the middle of a line.
-void silence_encoders() {
-  if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) {
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  }
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // AV_LOG_QUIET; read when the first video is opened
-}
-
 struct Encoder {
   cv::VideoCaptureAPIs api;
   std::array<char, 5> fourcc;
@@ -79,7 +70,7 @@ class VideoOutput final : public Output {
     if (fs::is_directory(path_)) refuse(path_, "is a folder", "name a file, or a folder without that ending");
     errno = 0;
     if (const File probe{std::fopen(part_.c_str(), "wbe")}; !probe) refuse_write(path_, errno);
-    silence_encoders();
+    capture::silence_codecs();
     for (const Encoder& encoder : encoders(path_)) {
       const auto& name = encoder.fourcc;
       const int fourcc = cv::VideoWriter::fourcc(name[0], name[1], name[2], name[3]);
@@ -151,7 +142,7 @@ class VideoOutput final : public Output {
 class FolderOutput final : public Output {
  public:
   explicit FolderOutput(const std::string& target) : folder_(target) {
-    silence_encoders();
+    capture::silence_codecs();
     std::error_code error;
     fs::create_directories(folder_, error);
     if (!fs::is_directory(folder_)) refuse_write(folder_, error ? error.value() : ENOTDIR);

@@ -1,6 +1,5 @@
 #include "firmware-app/stereotrack/monitor.hpp"
 
-#include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -9,7 +8,6 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdarg>
 #include <cstdio>
 #include <deque>
@@ -19,6 +17,7 @@
 
 #include "drivers/telemetry/receiver.hpp"
 #include "drivers/telemetry/udp_listener.hpp"
+#include "firmware-app/stereotrack/interrupt.hpp"
 
 namespace stereotrack {
 namespace {
@@ -34,47 +33,6 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kRedraw = std::chrono::milliseconds(100);
 constexpr auto kRateSpan = std::chrono::seconds(2);
 constexpr int kBurst = 64;  // datagrams taken before signals and the screen get their turn again
-
-volatile std::sig_atomic_t g_stop = 0;
-
-/// Ctrl-C ends the wait and nothing else; the handlers of before come back at the end. The signals are
-/// blocked but while waiting, so that none falls between the question and the wait.
-class StopSignals {
- public:
-  StopSignals() {
-    g_stop = 0;
-    struct sigaction action {};
-    action.sa_handler = [](int) { g_stop = 1; };
-    sigset_t blocked;
-    sigemptyset(&blocked);
-    for (std::size_t i = 0; i < kSignals.size(); ++i) {
-      sigaddset(&blocked, kSignals[i]);
-      sigaction(kSignals[i], &action, &before_[i]);
-    }
-    pthread_sigmask(SIG_BLOCK, &blocked, &mask_before_);
-  }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
-  ~StopSignals() {
-    pthread_sigmask(SIG_SETMASK, &mask_before_, nullptr);
-    for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before_[i], nullptr);
-  }
-
-  /// Until `fd` can be read, a signal comes or the time is over.
-  void wait(int fd, Clock::duration longest) const {
-    const auto ns = std::max(std::chrono::duration_cast<std::chrono::nanoseconds>(longest).count(), std::int64_t{0});
-    const timespec time{ns / 1'000'000'000, ns % 1'000'000'000};
-    pollfd poll{fd, POLLIN, 0};
-    sigset_t open = mask_before_;
-    for (const int signal : kSignals) sigdelset(&open, signal);
-    (void)ppoll(&poll, 1, &time, &open);
-  }
-
- private:
-  static constexpr std::array<int, 2> kSignals{SIGINT, SIGTERM};
-  std::array<struct sigaction, 2> before_{};
-  sigset_t mask_before_{};
-};
 
 [[gnu::format(printf, 2, 3)]] void append(std::string& text, const char* format, ...) {
   std::array<char, 256> line{};
@@ -301,7 +259,7 @@ std::string summary_line(const Receiver& receiver) {
 int run_monitor(const MonitorArguments& arguments, std::ostream& out, std::ostream& messages) {
   telemetry::UdpListener listener(telemetry::parse_endpoint(arguments.listen, true));
   const std::string where = to_string(listener.local());
-  const StopSignals signals;
+  const Interrupts interrupts;
   const bool live = arguments.live && !arguments.json;
   const auto timeout = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(arguments.timeout_s > 0 ? std::min(arguments.timeout_s, 1e8) : 1e8));
@@ -316,7 +274,7 @@ int run_monitor(const MonitorArguments& arguments, std::ostream& out, std::ostre
   const auto enough = [&] { return arguments.count > 0 && receiver.counters().pairs >= arguments.count; };
 
   if (!live) messages << "listening on " << where << ", ctrl-C ends" << std::endl;
-  while (g_stop == 0 && !enough() && out) {
+  while (!interrupts.asked() && !enough() && out) {
     for (int taken = 0; taken < kBurst && !enough(); ++taken) {
       const std::ptrdiff_t size = listener.receive(buffer);
       if (size < 0) break;
@@ -344,7 +302,7 @@ int run_monitor(const MonitorArguments& arguments, std::ostream& out, std::ostre
     const Clock::duration left = last_valid + timeout - now;
     timed_out = left <= Clock::duration::zero();
     if (timed_out || enough()) break;
-    signals.wait(listener.fd(), live ? std::min<Clock::duration>(left, kRedraw) : left);
+    interrupts.wait(listener.fd(), live ? std::min<Clock::duration>(left, kRedraw) : left);
   }
 
   if (live) screen.draw(rigs, receiver, where, Clock::now());

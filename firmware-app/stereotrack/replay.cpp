@@ -70,8 +70,9 @@ class Pacer {
 // Everything that one replay carries from frame to frame.
 class Replay {
  public:
-  Replay(const ReplayArguments& arguments, std::ostream& messages)
+  Replay(const ReplayArguments& arguments, const Interrupts& interrupts, std::ostream& messages)
       : arguments_(arguments),
+        interrupts_(interrupts),
         messages_(messages),
         rig_(open_rig(arguments.rig)),
         pipeline_(make_pipeline(rig_, arena_, times_.observer())),
@@ -101,7 +102,7 @@ class Replay {
       expected = std::min(*info.pairs, arguments_.frames.last) - std::min(*info.pairs, arguments_.frames.first - 1);
     Progress progress(messages_, expected);
     FramePair pair;
-    while (!interrupted()) {
+    while (!interrupts_.asked()) {
       const capture::Next next = rig_.source->next(pair);
       if (next == capture::Next::kEnd || pair.ordinal > arguments_.frames.last) break;
       if (next == capture::Next::kSkipped) {
@@ -112,7 +113,7 @@ class Replay {
       progress.step();
     }
     progress.finish();
-    return !interrupted();
+    return !interrupts_.asked();
   }
 
   void save() {
@@ -230,6 +231,7 @@ class Replay {
   }
 
   const ReplayArguments& arguments_;
+  const Interrupts& interrupts_;
   std::ostream& messages_;
   Rig rig_;
   StageTimes times_;
@@ -252,8 +254,8 @@ class Replay {
 
 int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream& messages) {
   // First of all: no file may be open yet when ctrl-C would still end the program at once.
-  catch_interrupts();
-  Replay replay(arguments, messages);
+  const Interrupts interrupts;
+  Replay replay(arguments, interrupts, messages);
   if (!replay.run()) {
     throw std::runtime_error(arguments.rig.source + ": interrupted; nothing was written");
   }
@@ -267,12 +269,12 @@ int run_masks(const MasksArguments& arguments, std::ostream& messages) {
   Arena arena;
   Pipeline pipeline = make_pipeline(rig, arena);
   make_output_folder(arguments.out);
-  catch_interrupts();
+  const Interrupts interrupts;
   const capture::SourceInfo& info = rig.source->info();
   if (arguments.frames.first > 1) rig.source->skip_to(arguments.frames.first - 1);
   Progress progress(messages, info.pairs);
   FramePair pair;
-  while (!interrupted()) {
+  while (!interrupts.asked()) {
     const capture::Next next = rig.source->next(pair);
     if (next == capture::Next::kEnd || pair.ordinal > arguments.frames.last) break;
     cv::Mat picture = cv::Mat::zeros(info.height, info.width, CV_8UC1);
@@ -296,7 +298,7 @@ int run_masks(const MasksArguments& arguments, std::ostream& messages) {
     progress.step();
   }
   progress.finish();
-  if (interrupted()) throw std::runtime_error(arguments.rig.source + ": interrupted; the masks so far are whole");
+  if (interrupts.asked()) throw std::runtime_error(arguments.rig.source + ": interrupted; the masks so far are whole");
   return 0;
 }
 

@@ -145,13 +145,13 @@ int run_synth(const SynthArguments& arguments, std::ostream& messages) {
     throw config::Error(error.what());
   }
   prepare(arguments.out);
-  catch_interrupts();
+  const Interrupts interrupts;
 
   Progress progress(messages, options.frames);
   std::string rows;
   std::future<void> writing;
   FramePair pair;
-  while (!interrupted()) {
+  while (!interrupts.asked()) {
     const capture::Next next = source->next(pair);
     if (next == capture::Next::kEnd) break;
     if (next == capture::Next::kSkipped) throw std::runtime_error(source->skip_reason());
@@ -169,7 +169,7 @@ int run_synth(const SynthArguments& arguments, std::ostream& messages) {
   }
   if (writing.valid()) writing.get();
   progress.finish();
-  if (interrupted()) {
+  if (interrupts.asked()) {
     throw std::runtime_error(arguments.out.string() +
                              ": interrupted; the pictures so far are whole, gt.csv is missing");
   }

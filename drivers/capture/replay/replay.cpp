@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <filesystem>
-#include <opencv2/core/utils/logger.hpp>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "drivers/capture/replay/folder_source.hpp"
+#include "drivers/capture/replay/silence.hpp"
 #include "drivers/capture/replay/video_source.hpp"
 
 namespace stereotrack::capture {
@@ -43,13 +42,6 @@ constexpr std::array<Layout, 4> kLayouts{{{Recording::Kind::kEuroc, "cam0", "cam
                                           {Recording::Kind::kFolders, "left", "right"}}};
 
 [[noreturn]] void fail(const std::string& what, const std::string& why) { throw std::runtime_error(what + ": " + why); }
-
-void silence_decoders() {
-  if (std::getenv("OPENCV_LOG_LEVEL") == nullptr) {
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  }
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // AV_LOG_QUIET; read when the first video is opened
-}
 
 bool is_folder(const fs::path& path) {
   std::error_code error;
@@ -186,7 +178,7 @@ std::unique_ptr<FrameSource> open_replay(const std::string& source, const Replay
     fail(source, "a rate of " + std::to_string(options.fps) + " Hz is outside 0.1..10000");
   }
   if (source.empty()) fail("source", "is empty: give " + std::string(kForms));
-  silence_decoders();
+  silence_codecs();
 
   if (source.starts_with("mono:")) return open_mono(source, source.substr(5), options);
   if (source.starts_with("sbs:")) {
