@@ -1,7 +1,9 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "pipeline/core/time.hpp"
 
@@ -31,8 +33,9 @@ struct Picture {
 /// What was exposed at one moment by both sensors. `right` is empty for a mono source.
 /// The pixels stay valid until the source is asked for the next pair.
 struct FramePair {
-  std::uint64_t ordinal = 0;   ///< from 1, counts the source's pairs, unreadable ones too
-  CaptureTime capture_time{};  ///< middle of the exposure
+  std::uint64_t ordinal = 0;                     ///< from 1, counts the source's pairs, unreadable ones too
+  CaptureTime capture_time{};                    ///< middle of the exposure, of the left sensor where each has its own
+  std::optional<std::chrono::nanoseconds> skew;  ///< right capture time - left; none: one stamp for both, or mono
   Picture left;
   Picture right;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -151,8 +152,8 @@ class Replay {
         line, sizeof line,
         "%llu pairs, %llu skipped, %llu tracks, %llu rows; pipeline p50 %.2f ms, p99 %.2f ms, max %.2f ms\n",
         static_cast<unsigned long long>(summary_.frames), static_cast<unsigned long long>(summary_.skipped),
-        static_cast<unsigned long long>(tracks_.tracks()), static_cast<unsigned long long>(tracks_.rows()),
-        whole.p50_ms, whole.p99_ms, whole.max_ms);
+        static_cast<unsigned long long>(tracks_.tracks()), static_cast<unsigned long long>(tracks_.rows()), whole.p50,
+        whole.p99, whole.max);
     out << line;
     out << "rejected candidates:";
     for (std::size_t i = 0; i < kRejections; ++i) {
@@ -194,6 +195,9 @@ class Replay {
     }
     if (summary_.frames >= kWarmUpFrames) summary_.allocations_after_warmup += allocations_of_this_thread() - before;
     ++summary_.frames;
+    if (pair.skew) {
+      summary_.pair_skews_us.push_back(std::abs(std::chrono::duration<double, std::micro>(*pair.skew).count()));
+    }
     summary_.flags |= result->flags;
     for (std::size_t i = 0; i < kRejections; ++i) summary_.rejections[i] += result->rejections[i];
     tracks_.add(pair.ordinal, result->tracks);

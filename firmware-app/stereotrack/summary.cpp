@@ -12,20 +12,19 @@ namespace stereotrack {
 
 namespace {
 
-StageTimes::Percentiles percentiles(std::vector<double> ms) {
-  if (ms.empty()) return {};
-  std::sort(ms.begin(), ms.end());
-  const auto at = [&](double part) {
-    return ms[std::min(static_cast<std::size_t>(part * static_cast<double>(ms.size())), ms.size() - 1)];
-  };
-  return {at(0.5), at(0.99), ms.back()};
-}
-
-nlohmann::ordered_json json_of(const StageTimes::Percentiles& p) {
-  return {{"p50", p.p50_ms}, {"p99", p.p99_ms}, {"max", p.max_ms}};
-}
+nlohmann::ordered_json json_of(const Percentiles& p) { return {{"p50", p.p50}, {"p99", p.p99}, {"max", p.max}}; }
 
 }  // namespace
+
+Percentiles percentiles(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double part) {
+    const auto index = static_cast<std::size_t>(part * static_cast<double>(values.size()));
+    return values[std::min(index, values.size() - 1)];
+  };
+  return {at(0.5), at(0.99), values.back()};
+}
 
 Digest::Digest() : state_(new crypto_generichash_blake2b_state) {
   (void)crypto_generichash_blake2b_init(state_, nullptr, 0, crypto_generichash_blake2b_BYTES);
@@ -74,9 +73,9 @@ void StageTimes::stage_ended(void* context, Stage stage) noexcept {
   self.last_ = now;
 }
 
-StageTimes::Percentiles StageTimes::of(Stage stage) const { return percentiles(ms_[static_cast<std::size_t>(stage)]); }
+Percentiles StageTimes::of(Stage stage) const { return percentiles(ms_[static_cast<std::size_t>(stage)]); }
 
-StageTimes::Percentiles StageTimes::whole() const {
+Percentiles StageTimes::whole() const {
   std::vector<double> sum = ms_[0];
   for (std::size_t stage = 1; stage < kStages; ++stage) {
     for (std::size_t i = 0; i < sum.size() && i < ms_[stage].size(); ++i) sum[i] += ms_[stage][i];
@@ -92,6 +91,11 @@ void save_summary(const std::filesystem::path& path, const Summary& summary, con
                    {"telemetry_full_socket", summary.telemetry_dropped},
                    {"telemetry_failed", summary.telemetry_failed}};
   json["skipped"] = summary.skip_reasons;
+  if (summary.pair_skews_us.empty()) {
+    json["pair_skew_us"] = nullptr;
+  } else {
+    json["pair_skew_us"] = json_of(percentiles(summary.pair_skews_us));
+  }
   json["tracks"] = summary.tracks;
   json["rows"] = summary.rows;
   json["deadline_misses"] = summary.deadline_misses;

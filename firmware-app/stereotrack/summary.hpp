@@ -30,18 +30,22 @@ class Digest {
   crypto_generichash_blake2b_state* state_;
 };
 
-/// Times of each stage of each frame; give observer() to the pipeline.
+struct Percentiles {
+  double p50 = 0;
+  double p99 = 0;
+  double max = 0;
+};
+
+/// Zeros for no values.
+[[nodiscard]] Percentiles percentiles(std::vector<double> values);
+
+/// Times of each stage of each frame [ms]; give observer() to the pipeline.
 class StageTimes {
  public:
   [[nodiscard]] StageObserver observer() noexcept { return {&StageTimes::stage_ended, this}; }
   /// Before each frame: takes the room for its times, so that the observer takes none while the stages run.
   void frame_begins();
 
-  struct Percentiles {
-    double p50_ms = 0;
-    double p99_ms = 0;
-    double max_ms = 0;
-  };
   [[nodiscard]] Percentiles of(Stage stage) const;
   [[nodiscard]] Percentiles whole() const;
 
@@ -57,6 +61,7 @@ struct Summary {
   std::uint64_t frames = 0;               ///< pairs that went through the pipeline
   std::uint64_t skipped = 0;              ///< pairs that could not be read
   std::vector<std::string> skip_reasons;  ///< the first hundred
+  std::vector<double> pair_skews_us;      ///< |right - left capture time| of each pair whose source has both
   std::uint64_t tracks = 0;               ///< confirmed ones
   std::uint64_t rows = 0;                 ///< of tracks.csv
   std::uint32_t flags = 0;                ///< FrameFlag bits of all frames together

@@ -46,6 +46,7 @@ TEST_P(Summary, SaysWhatTheRunWasAndDid) {
   EXPECT_EQ(summary["colour"], std::get<1>(GetParam()) != Source::kGrey);
   EXPECT_EQ(summary["rows"], rows.size());
   EXPECT_EQ(summary["deadline_misses"], 0);
+  EXPECT_TRUE(summary.at("pair_skew_us").is_null()) << "numbered pictures have no times";
   EXPECT_EQ(summary["drops"]["unreadable"], 0);
   EXPECT_EQ(summary["drops"]["telemetry_failed"], 0);
   EXPECT_EQ(summary["skipped"], nlohmann::ordered_json::array());
@@ -77,6 +78,25 @@ INSTANTIATE_TEST_SUITE_P(Sources, Summary,
                          testing::Combine(testing::Values("robust", "thesis"),
                                           testing::Values(Source::kColour, Source::kGrey, Source::kMono)),
                          case_name);
+
+TEST(SummaryOfStamps, PairSkewIsTheDistanceOfTheStampsInMicroseconds) {
+  const TempDir folder;
+  const fs::path scene = folder / "scene";
+  SmallScene::write(scene, 5);
+  constexpr std::array<int, 5> kSkew_ns{-7000, 2500, 0, 1000, -3000};
+  for (int i = 0; i < 5; ++i) {
+    const int left_ns = 100'000'000 + 33'000'000 * i;
+    for (const bool right : {false, true}) {
+      const int stamp_ns = right ? left_ns + kSkew_ns.at(static_cast<std::size_t>(i)) : left_ns;
+      const fs::path view = scene / (right ? "right" : "left");
+      fs::rename(view / numbered(i + 1), view / ("1585434279_" + std::to_string(stamp_ns) + ".png"));
+    }
+  }
+  const ProgramResult result = stereotrack_command({"replay", scene.string(), "--out", (folder / "out").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::ordered_json skew = summary_of(folder / "out")["pair_skew_us"];
+  EXPECT_EQ(skew, nlohmann::ordered_json({{"p50", 2.5}, {"p99", 7.0}, {"max", 7.0}}));
+}
 
 // Many objects, occlusions and more frames than the buffers of the stage times begin with.
 TEST(SummaryOfEleven, NoHeapCallAfterWarmUp) {

@@ -97,6 +97,7 @@ Next FolderSource::read_next(FramePair& out) {
     reason_ = current_.fault;
     return Next::kSkipped;
   }
+  out.skew = pairing_.entries[position_ - 1].skew;
   out.left = view_of(current_.left);
   if (info_.stereo) out.right = view_of(current_.right);
   return Next::kPair;

@@ -147,10 +147,10 @@ Pairing finish(PairedBy by, nanoseconds period, double fps, std::vector<KeyedEnt
                                               : ": no number in the name as in the others";
   const CaptureTime end = pairing.entries.empty() ? CaptureTime{} : pairing.entries.back().time;
   for (const ViewFile* file : strays_left) {
-    pairing.entries.push_back({file->path, {}, end, nanoseconds(0), file->path.string() + missing});
+    pairing.entries.push_back({file->path, {}, end, {}, file->path.string() + missing});
   }
   for (const ViewFile* file : strays_right) {
-    pairing.entries.push_back({{}, file->path, end, nanoseconds(0), file->path.string() + missing});
+    pairing.entries.push_back({{}, file->path, end, {}, file->path.string() + missing});
   }
   return pairing;
 }
@@ -196,17 +196,19 @@ Pairing pair_views(const View& left, const View& right, double fps) {
   for (std::size_t i = 0; i < lefts.items.size(); ++i) {
     const Keyed::Item& l = lefts.items[i];
     if (partner[i] == kNone) {
-      entries.push_back({l.key, {l.file->path, {}, {}, nanoseconds(0), no_partner(*l.file, "right", by, period)}});
+      entries.push_back({l.key, {l.file->path, {}, {}, {}, no_partner(*l.file, "right", by, period)}});
       continue;
     }
     const Keyed::Item& r = rights.items[partner[i]];
     taken[partner[i]] = 1;
-    entries.push_back({l.key, {l.file->path, r.file->path, {}, nanoseconds(r.key - l.key), {}}});
+    PairEntry pair{l.file->path, r.file->path, {}, {}, {}};
+    if (by == PairedBy::kTime) pair.skew = nanoseconds(r.key - l.key);
+    entries.push_back({l.key, std::move(pair)});
   }
   for (std::size_t j = 0; j < rights.items.size(); ++j) {
     if (taken[j] != 0) continue;
     const Keyed::Item& r = rights.items[j];
-    entries.push_back({r.key, {{}, r.file->path, {}, nanoseconds(0), no_partner(*r.file, "left", by, period)}});
+    entries.push_back({r.key, {{}, r.file->path, {}, {}, no_partner(*r.file, "left", by, period)}});
   }
   return finish(by, period, fps, std::move(entries), lefts.strays, rights.strays);
 }
@@ -225,7 +227,7 @@ Pairing single_view(const View& view, double fps) {
   }
   std::vector<KeyedEntry> entries;
   for (const Keyed::Item& item : keyed.items) {
-    entries.push_back({item.key, {item.file->path, {}, {}, nanoseconds(0), {}}});
+    entries.push_back({item.key, {item.file->path, {}, {}, {}, {}}});
   }
   return finish(by, period, fps, std::move(entries), keyed.strays, {});
 }

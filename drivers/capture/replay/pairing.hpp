@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,10 +17,10 @@ enum class PairedBy : std::uint8_t { kTime, kNumber, kOrder };
 /// One ordinal of a source: a pair, or a file whose partner does not exist.
 struct PairEntry {
   std::filesystem::path left;
-  std::filesystem::path right;       ///< empty for a single view
-  CaptureTime time{};                ///< of the left file, or of the only one
-  std::chrono::nanoseconds skew{0};  ///< right time - left time, 0 where pairs are not formed by time
-  std::string fault;                 ///< one line naming the file if this entry cannot be a pair, else empty
+  std::filesystem::path right;                   ///< empty for a single view
+  CaptureTime time{};                            ///< of the left file, or of the only one
+  std::optional<std::chrono::nanoseconds> skew;  ///< right time - left time; none: not a pair formed by time
+  std::string fault;  ///< one line naming the file if this entry cannot be a pair, else empty
 };
 
 struct Pairing {

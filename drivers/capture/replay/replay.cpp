@@ -138,11 +138,16 @@ std::unique_ptr<FrameSource> open_folders(const std::string& source, Recording r
   View left = list_view(recording.kind, recording.left);
   View right = list_view(recording.kind, recording.right);
   const fs::path times = recording.left.parent_path() / "times.txt";
-  if (recording.kind == Recording::Kind::kKitti && fs::exists(times)) {
+  const bool one_list_of_times = recording.kind == Recording::Kind::kKitti && fs::exists(times);
+  if (one_list_of_times) {
     apply_kitti_times(times, left);
     apply_kitti_times(times, right);
   }
-  return std::make_unique<FolderSource>(source, pair_views(left, right, options.fps), true, options);
+  Pairing pairing = pair_views(left, right, options.fps);
+  if (one_list_of_times) {
+    for (PairEntry& entry : pairing.entries) entry.skew.reset();
+  }
+  return std::make_unique<FolderSource>(source, std::move(pairing), true, options);
 }
 
 std::unique_ptr<FrameSource> open_mono(const std::string& source, const fs::path& path, const ReplayOptions& options) {

@@ -46,6 +46,9 @@ struct ReplayOptions {
 ///   missing stamp, or one not later than the one before, counts as one period later. has_time = true. A
 ///   container without a rate in (0, 1000] Hz: (ordinal - 1) / fps, has_time = false.
 ///
+/// **Skew** of a pair, right stamp - left stamp: where each file has a stamp of its own (EuRoC, names with unix time).
+/// times.txt of KITTI has one for both views, the stamps of two videos count from two beginnings: none.
+///
 /// **What cannot be read** - missing, truncated, corrupt, of another size, without a partner - is one kSkipped with a
 /// line that names the file; it keeps its ordinal. A video that ends at least three frames before the end that its
 /// container announces gives one kSkipped that says so.

@@ -36,6 +36,7 @@ TEST(LeftRightFolder, NumbersGiveOrderPairsAndTime) {
     EXPECT_EQ(answers[i].left, numbers[i]);
     EXPECT_EQ(answers[i].right, 100 + numbers[i]);
     EXPECT_EQ(answers[i].time_ns, times[i]);
+    EXPECT_EQ(answers[i].skew, std::nullopt);
   }
   EXPECT_EQ(ask(*source).next, Next::kEnd);
   EXPECT_EQ(ask(*source).next, Next::kEnd);
@@ -58,6 +59,9 @@ TEST(LeftRightFolder, UnixTimesAreExactAndTheRightNameMayDiffer) {
   ASSERT_EQ(answers.size(), 3U);
   EXPECT_EQ(answers[0].time_ns, 1585434279805531979);
   EXPECT_EQ(answers[1].time_ns, 1585434279838711977);
+  EXPECT_EQ(answers[0].skew, std::chrono::nanoseconds(-979)) << "right - left";
+  EXPECT_EQ(answers[1].skew, std::chrono::nanoseconds(23));
+  EXPECT_EQ(answers[2].skew, std::chrono::nanoseconds(0));
   EXPECT_EQ(answers[2].right, 103);
 }
 
@@ -253,6 +257,7 @@ TEST(KittiFolder, TimesBelongToNumbersNotToOrder) {
   ASSERT_EQ(answers.size(), 2U);
   EXPECT_EQ(answers[0].time_ns, 103'622'400);
   EXPECT_EQ(answers[1].time_ns, 300'000'000);
+  EXPECT_EQ(answers[0].skew, std::nullopt) << "one stamp for both views";
 }
 
 TEST(KittiFolder, TooFewTimesAreRefused) {

@@ -45,6 +45,13 @@ TEST(PairByTime, NearestWithinHalfAPeriodAndSkewIsKept) {
   EXPECT_EQ(pairing.entries[1].skew, nanoseconds(-10));
 }
 
+TEST(PairByTime, WithoutPartnerThereIsNoSkew) {
+  const Pairing pairing = pair_views(timed({1000, 2000}, "L"), timed({1001}, "R"), 30);
+  EXPECT_EQ(pairing.entries[0].skew, nanoseconds(1));
+  EXPECT_EQ(pairing.entries[1].skew, std::nullopt);
+  EXPECT_EQ(single_view(timed({1000, 2000}, "L"), 30).entries[0].skew, std::nullopt);
+}
+
 TEST(PairByTime, OverHalfAPeriodIsNoPair) {
   const Pairing pairing = pair_views(timed({1000, 2000, 3000}, "L"), timed({1000, 2000, 3501}, "R"), 30);
   EXPECT_THAT(text(pairing), ElementsAre("L1000-R1000", "L2000-R2000", "L3000-", "-R3501"));
@@ -100,6 +107,7 @@ TEST(PairByNumber, GapsAreElapsedPeriods) {
   const Pairing pairing = pair_views(numbered({7, 8, 11}, "L"), numbered({7, 8, 11}, "R"), 10);
   EXPECT_THAT(times(pairing), ElementsAre(0, 100'000'000, 400'000'000));
   EXPECT_EQ(pairing.period, nanoseconds(100'000'000));
+  EXPECT_EQ(pairing.entries[0].skew, std::nullopt);
 }
 
 TEST(PairByNumber, FileWithoutPartnerKeepsItsOrdinal) {

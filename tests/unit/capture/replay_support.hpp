@@ -3,12 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -50,6 +52,7 @@ struct Answer {
   Next next = Next::kEnd;
   std::uint64_t ordinal = 0;
   std::int64_t time_ns = 0;
+  std::optional<std::chrono::nanoseconds> skew;
   int left = -1;   ///< first pixel's first byte, -1: none
   int right = -1;  ///< same
   std::string reason;
@@ -61,6 +64,7 @@ inline Answer ask(FrameSource& source) {
   answer.next = source.next(pair);
   answer.ordinal = pair.ordinal;
   answer.time_ns = pair.capture_time.time_since_epoch().count();
+  answer.skew = pair.skew;
   if (!pair.left.empty()) answer.left = pair.left.data[0];
   if (!pair.right.empty()) answer.right = pair.right.data[0];
   if (answer.next == Next::kSkipped) answer.reason = source.skip_reason();
