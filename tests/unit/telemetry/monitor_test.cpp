@@ -2,12 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
+#include <pthread.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <sstream>
 #include <thread>
 
@@ -89,6 +90,7 @@ TEST(Monitor, JsonIsOneObjectADatagramAndNothingElse) {
   const auto list = telemetry::golden_tracks();
   telemetry::Encoder encoder(telemetry::kGoldenConfig);
   std::vector<Bytes> pairs;
+  pairs.reserve(2000);
   for (int i = 0; i < 2000; ++i) pairs.push_back(telemetry::encode(encoder, telemetry::golden_message(list))[0]);
   const Outcome run = run_with({.json = true, .count = 1}, pairs);
   EXPECT_EQ(run.exit_code, 0);

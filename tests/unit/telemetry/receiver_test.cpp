@@ -84,7 +84,8 @@ TEST(Decode, StateOfANewerSenderReadsAsUnknown) {
   stereotrack_Datagram datagram = valid();
   datagram.targets[0].state = stereotrack_State_STATE_COASTING;
   Bytes bytes = wire(datagram);
-  const auto at = std::ranges::search(bytes, std::array{std::byte{0x10}, std::byte{3}}).begin();  // field 2, 3
+  const std::array field_2_is_3{std::byte{0x10}, std::byte{3}};
+  const auto at = std::search(bytes.begin(), bytes.end(), field_2_is_3.begin(), field_2_is_3.end());
   ASSERT_NE(at, bytes.end());
   at[1] = std::byte{9};
   const auto back = decode(bytes);

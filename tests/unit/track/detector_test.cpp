@@ -72,64 +72,64 @@ class DetectorOf : public testing::Test {
   void make(const Detector::Config& c) {
     auto created = Detector::create(c, kWidth, kHeight, arena_);
     ASSERT_TRUE(created.has_value());
-    detector.emplace(*created);
-    if (rectifier) return;
+    detector_.emplace(*created);
+    if (rectifier_) return;
     auto rig = Rectifier::create(ideal_rig(), kWidth, kHeight, arena_);
     ASSERT_TRUE(rig.has_value());
-    rectifier.emplace(*rig);
+    rectifier_.emplace(*rig);
   }
 
   /// One more rectangle of the mask; those with one label are one blob. disparity < 0: unknown.
   void paint(std::uint16_t label, const Rect& where, double d) {
     const cv::Rect r(where.left, where.top, where.width, where.height);
-    labels(r).setTo(label);
-    disparity(r).setTo(d < 0 ? kNoDisparity : fixed(d));
+    labels_(r).setTo(label);
+    disparity_(r).setTo(d < 0 ? kNoDisparity : fixed(d));
   }
 
   Detector::Input input(std::span<const Prediction> predictions = {}, bool stereo = true) {
-    blobs.clear();
+    blobs_.clear();
     double most = 0;
-    cv::minMaxLoc(labels, nullptr, &most);
+    cv::minMaxLoc(labels_, nullptr, &most);
     for (std::uint16_t label = 1; label <= static_cast<std::uint16_t>(most); ++label) {
-      const Blob blob = measure_region(view(labels), {0, 0, kWidth, kHeight}, label);
-      if (blob.area > 0) blobs.push_back(blob);
+      const Blob blob = measure_region(view(labels_), {0, 0, kWidth, kHeight}, label);
+      if (blob.area > 0) blobs_.push_back(blob);
     }
     Detector::Input in;
-    in.blobs = blobs;
-    in.labels = view(labels);
+    in.blobs = blobs_;
+    in.labels = view(labels_);
     if (stereo) {
-      in.disparity = view(disparity);
-      in.rectifier = &*rectifier;
+      in.disparity = view(disparity_);
+      in.rectifier = &*rectifier_;
     }
-    in.y = view(y);
-    in.strength = view(strength);
+    in.y = view(y_);
+    in.strength = view(strength_);
     in.predictions = predictions;
     return in;
   }
   std::span<const Detection> run(const std::vector<Prediction>& predictions = {}, bool stereo = true) {
     const Detector::Input in = input(predictions, stereo);
-    (void)detector->segment(in);
-    return detector->conclude(in);
+    (void)detector_->segment(in);
+    return detector_->conclude(in);
   }
   [[nodiscard]] std::uint32_t rejected(Rejection why) const {
-    return detector->rejections()[static_cast<std::size_t>(why)];
+    return detector_->rejections()[static_cast<std::size_t>(why)];
   }
   [[nodiscard]] std::uint32_t rejected() const {
     std::uint32_t sum = 0;
-    for (std::uint32_t count : detector->rejections()) sum += count;
+    for (std::uint32_t count : detector_->rejections()) sum += count;
     return sum;
   }
 
-  cv::Mat_<std::uint16_t> labels{cv::Size(kWidth, kHeight), std::uint16_t{0}};
-  cv::Mat_<std::uint16_t> disparity{cv::Size(kWidth, kHeight), kNoDisparity};
-  cv::Mat_<std::uint8_t> y{cv::Size(kWidth, kHeight), std::uint8_t{77}};
-  cv::Mat_<std::uint8_t> strength{cv::Size(kWidth, kHeight), std::uint8_t{40}};
-  std::vector<Blob> blobs;
-  std::optional<Detector> detector;
+  cv::Mat_<std::uint16_t> labels_{cv::Size(kWidth, kHeight), std::uint16_t{0}};
+  cv::Mat_<std::uint16_t> disparity_{cv::Size(kWidth, kHeight), kNoDisparity};
+  cv::Mat_<std::uint8_t> y_{cv::Size(kWidth, kHeight), std::uint8_t{77}};
+  cv::Mat_<std::uint8_t> strength_{cv::Size(kWidth, kHeight), std::uint8_t{40}};
+  std::vector<Blob> blobs_;
+  std::optional<Detector> detector_;
 
  private:
   Arena arena_;
-  std::optional<Rectifier> rectifier;
+  std::optional<Rectifier> rectifier_;
 };
 
 TEST_F(DetectorOf, NoBlobIsNoDetection) {
@@ -167,10 +167,10 @@ TEST_F(DetectorOf, LabelsAreThoseOfTheDetectionsLargestFirst) {
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].area, 400);
   EXPECT_EQ(found[1].area, 64);
-  EXPECT_EQ(labels(70, 70), 1);
-  EXPECT_EQ(labels(12, 12), 2);
-  EXPECT_EQ(labels(21, 121), 0);
-  EXPECT_EQ(cv::countNonZero(labels), 464);
+  EXPECT_EQ(labels_(70, 70), 1);
+  EXPECT_EQ(labels_(12, 12), 2);
+  EXPECT_EQ(labels_(21, 121), 0);
+  EXPECT_EQ(cv::countNonZero(labels_), 464);
 }
 
 TEST_F(DetectorOf, TooSmallIsRejectedAndCounted) {
@@ -221,7 +221,7 @@ TEST_F(DetectorOf, SegmentsOfOneBlobAreOneObjectUpToSplitDepth) {
     c.merge_depth = 0.02;
     c.split_depth = 0.2;
     make(c);
-    labels.setTo(0);
+    labels_.setTo(0);
     paint(1, {40, 40, 20, 24}, 20);
     paint(right_label, {60, 40, 20, 24}, right);
     return run().size();
@@ -257,13 +257,13 @@ TEST_F(DetectorOf, NearPiecesOfEqualDepthAreMerged) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].box, (Rect{40, 30, 20, 33}));
   EXPECT_EQ(found[0].area, 600);
-  EXPECT_EQ(labels(35, 45), 1);
-  EXPECT_EQ(labels(55, 45), 1);
+  EXPECT_EQ(labels_(35, 45), 1);
+  EXPECT_EQ(labels_(55, 45), 1);
 }
 
 TEST_F(DetectorOf, FarPiecesAndPiecesOfOtherDepthAreNotMerged) {
   const auto objects = [&](const Rect& other, double other_disparity) {
-    labels.setTo(0);
+    labels_.setTo(0);
     paint(1, {40, 30, 20, 20}, 20);
     paint(2, other, other_disparity);
     return run().size();
@@ -280,7 +280,7 @@ TEST_F(DetectorOf, PiecesThatOneTargetExplainsAreMergedAcrossAGap) {
   paint(1, {40, 20, 16, 14}, 20);
   paint(2, {40, 46, 16, 14}, 20);  // gap of 12 px
   EXPECT_EQ(run().size(), 2U);
-  labels.setTo(0);
+  labels_.setTo(0);
   paint(1, {40, 20, 16, 14}, 20);
   paint(2, {40, 46, 16, 14}, 20);
   const std::span<const Detection> found = run({expected(1, {40, 20, 16, 40}, 20)});
@@ -290,7 +290,7 @@ TEST_F(DetectorOf, PiecesThatOneTargetExplainsAreMergedAcrossAGap) {
 
 TEST_F(DetectorOf, PiecesOfATargetDoNotMakeItGrow) {
   const auto objects = [&](const Rect& target) {
-    labels.setTo(0);
+    labels_.setTo(0);
     paint(1, {40, 20, 16, 14}, 20);
     paint(2, {40, 46, 16, 14}, 20);  // 40 rows together
     return run({expected(1, target, 20)}).size();
@@ -301,7 +301,7 @@ TEST_F(DetectorOf, PiecesOfATargetDoNotMakeItGrow) {
 
 TEST_F(DetectorOf, PiecesClaimedByDifferentTargetsAreNotMerged) {
   const auto draw = [&] {
-    labels.setTo(0);
+    labels_.setTo(0);
     paint(1, {40, 30, 20, 20}, 20);
     paint(2, {62, 30, 20, 20}, 20);
   };
@@ -317,7 +317,7 @@ TEST_F(DetectorOf, PiecesClaimedByDifferentTargetsAreNotMerged) {
 
 TEST_F(DetectorOf, TargetsOneAboveTheOtherOfOneDepthAndMotionAreOneObject) {
   const auto draw = [&](double lower_disparity) {
-    labels.setTo(0);
+    labels_.setTo(0);
     paint(1, {40, 30, 20, 20}, 20);
     paint(2, {40, 53, 20, 20}, lower_disparity);
   };
@@ -371,11 +371,11 @@ TEST_F(DetectorOf, TargetHiddenBehindAnotherClaimsNothing) {
 TEST_F(DetectorOf, HiddenTargetClaimsNothingOfWhatHidesIt) {
   paint(1, {40, 40, 30, 24}, 40);
   const std::vector<Prediction> hidden{expected(1, {44, 40, 24, 24}, 20)};
-  std::span<const Detector::Candidate> pieces = detector->segment(input(hidden));
+  std::span<const Detector::Candidate> pieces = detector_->segment(input(hidden));
   ASSERT_EQ(pieces.size(), 1U);
   EXPECT_EQ(pieces[0].claim, -1);
   const std::vector<Prediction> seen{expected(1, {44, 40, 24, 24}, 40)};
-  pieces = detector->segment(input(seen));
+  pieces = detector_->segment(input(seen));
   ASSERT_EQ(pieces.size(), 1U);
   EXPECT_EQ(pieces[0].claim, 0) << "at its own depth it does";
 }
@@ -385,10 +385,10 @@ TEST_F(DetectorOf, HiddenTargetsLooksDoNotCutWhatHidesIt) {
   paint(1, {40, 40, 30, 24}, 40);
   for (int v = 40; v < 64; ++v) {
     for (int u = 50; u < 62; ++u) {
-      if ((u + 2 * v) % 5 == 0) disparity(v, u) = fixed(20);
+      if ((u + 2 * v) % 5 == 0) disparity_(v, u) = fixed(20);
     }
   }
-  y(cv::Rect(50, 40, 12, 24)).setTo(200);
+  y_(cv::Rect(50, 40, 12, 24)).setTo(200);
   Appearance pale;
   for (int i = 0; i < 300; ++i) pale.add(200, 128, 128);
   std::vector<Prediction> both{expected(1, {40, 40, 30, 24}, 40), expected(2, {50, 40, 12, 24}, 20)};
@@ -406,11 +406,11 @@ TEST_F(DetectorOf, PieceMayBeSomewhatNearerOrLookSomewhatDifferentNotBoth) {
   std::vector<Prediction> target{expected(1, {40, 40, 20, 24}, 20)};
   target[0].appearance = &grey;
   const auto claim = [&](double d, int strange_columns) {
-    labels.setTo(0);
-    y.setTo(77);
+    labels_.setTo(0);
+    y_.setTo(77);
     paint(1, {40, 40, 20, 24}, d);
-    if (strange_columns > 0) y(cv::Rect(40, 40, strange_columns, 24)).setTo(200);
-    const std::span<const Detector::Candidate> pieces = detector->segment(input(target));
+    if (strange_columns > 0) y_(cv::Rect(40, 40, strange_columns, 24)).setTo(200);
+    const std::span<const Detector::Candidate> pieces = detector_->segment(input(target));
     EXPECT_EQ(pieces.size(), 1U);
     return pieces.empty() ? -2 : pieces[0].claim;
   };
@@ -432,15 +432,15 @@ TEST_F(DetectorOf, PieceThatLooksAlikeMayLieWithinTheTargetsKnownReach) {
   paint(1, {40, 40, 20, 24}, 24.5);  // 4.5 px nearer; merge_depth and noise alone allow 2.5
   std::vector<Prediction> target{expected(1, {40, 40, 20, 24}, 20)};
   target[0].appearance = &grey;
-  EXPECT_EQ(detector->segment(input(target))[0].claim, -1);
+  EXPECT_EQ(detector_->segment(input(target))[0].claim, -1);
   target[0].disparity_reach = 6;
-  EXPECT_EQ(detector->segment(input(target))[0].claim, 0);
+  EXPECT_EQ(detector_->segment(input(target))[0].claim, 0);
 }
 
 TEST_F(DetectorOf, LooksDecideWhoseThePixelsAreWhereDepthDoesNot) {
   // One blob at one depth, expected side by side half and half; by its looks the left one has a third.
   paint(1, {40, 40, 48, 20}, 20);
-  y(cv::Rect(40, 40, 16, 20)).setTo(200);
+  y_(cv::Rect(40, 40, 16, 20)).setTo(200);
   Appearance pale;
   Appearance grey;
   for (int i = 0; i < 400; ++i) {
@@ -520,14 +520,14 @@ TEST_F(DetectorOf, CandidateThatTheCallerCallsTheBackgroundsOwnSurfaceIsRejected
   paint(1, {10, 20, 20, 16}, 20.5);
   paint(2, {100, 80, 20, 16}, 23);
   const Detector::Input in = input();
-  for (Detector::Candidate& candidate : detector->segment(in)) {
+  for (Detector::Candidate& candidate : detector_->segment(in)) {
     EXPECT_FALSE(candidate.own_surface);
     candidate.own_surface = candidate.box.left == 10;
   }
-  const std::span<const Detection> found = detector->conclude(in);
+  const std::span<const Detection> found = detector_->conclude(in);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].box.left, 100);
-  EXPECT_EQ(labels(25, 15), 0);
+  EXPECT_EQ(labels_(25, 15), 0);
   EXPECT_EQ(rejected(Rejection::kOwnSurface), 1U);
   EXPECT_EQ(rejected(), 1U);
 }
@@ -535,7 +535,7 @@ TEST_F(DetectorOf, CandidateThatTheCallerCallsTheBackgroundsOwnSurfaceIsRejected
 TEST_F(DetectorOf, CallerMayGiveACandidateItsDisparity) {
   paint(1, {100, 40, 20, 16}, -1);
   const Detector::Input in = input();
-  const std::span<Detector::Candidate> candidates = detector->segment(in);
+  const std::span<Detector::Candidate> candidates = detector_->segment(in);
   ASSERT_EQ(candidates.size(), 1U);
   EXPECT_FALSE(candidates[0].has_depth);
   EXPECT_EQ(candidates[0].valid, 0);
@@ -543,7 +543,7 @@ TEST_F(DetectorOf, CallerMayGiveACandidateItsDisparity) {
   candidates[0].disparity = 25;
   candidates[0].disparity_sd = 0.5;
   candidates[0].scatter = 0.5;
-  const std::span<const Detection> found = detector->conclude(in);
+  const std::span<const Detection> found = detector_->conclude(in);
   ASSERT_EQ(found.size(), 1U);
   ASSERT_TRUE(found[0].has_depth);
   EXPECT_NEAR(found[0].position.z(), 4, 1e-9);
@@ -566,7 +566,7 @@ TEST_F(DetectorOf, RejectionsAreThoseOfTheLastRun) {
   paint(1, {10, 10, 3, 3}, 20);
   (void)run();
   EXPECT_EQ(rejected(), 1U);
-  labels.setTo(0);
+  labels_.setTo(0);
   (void)run();
   EXPECT_EQ(rejected(), 0U);
 }

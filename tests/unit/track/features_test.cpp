@@ -58,18 +58,18 @@ class FeaturesOf : public testing::Test {
   void make(const Features::Config& c = config()) {
     auto created = Features::create(c, kSize.width, kSize.height, arena_);
     ASSERT_TRUE(created.has_value());
-    features.emplace(*created);
+    features_.emplace(*created);
   }
   void refill(Plane picture, const Rect& box, Features::Set& set, const Vector2& velocity = Vector2::Zero(),
               double velocity_sd = 50) {
-    features->refill(view(picture), view(labels), 1, box, velocity, velocity_sd, set);
+    features_->refill(view(picture), view(labels_), 1, box, velocity, velocity_sd, set);
   }
   void follow(Plane picture, double dt, Features::Set& set, double acceleration_sd = 20) const {
-    features->follow(view(picture), dt, acceleration_sd, set);
+    features_->follow(view(picture), dt, acceleration_sd, set);
   }
 
-  cv::Mat_<std::uint16_t> labels{kSize, std::uint16_t{1}};
-  std::optional<Features> features;
+  cv::Mat_<std::uint16_t> labels_{kSize, std::uint16_t{1}};
+  std::optional<Features> features_;
 
  private:
   Arena arena_;
@@ -137,8 +137,8 @@ TEST_F(FeaturesOf, CornersAreTheStrongestPlacesOfOpencvsMap) {
   Features::Set set;
   refill(picture, kAll, set);
   ASSERT_EQ(set.size(), static_cast<std::size_t>(Features::kMost));
-  for (std::size_t i = 0; i < set.size(); ++i) {
-    const Vector2 at = set[i].filter.position();
+  for (const auto& feature : set) {
+    const Vector2 at = feature.filter.position();
     const float strength = map.at<float>(static_cast<int>(at.y()), static_cast<int>(at.x()));
     EXPECT_GT(strength, values[values.size() * 95 / 100]) << at.transpose();
   }
@@ -159,8 +159,8 @@ TEST_F(FeaturesOf, CornersOfARectangleAreFoundAndNothingElse) {
 
 TEST_F(FeaturesOf, CornersAreAPatchApartAndInsideTheLabelAndTheBox) {
   make();
-  labels.setTo(0);
-  labels(cv::Rect(20, 20, 60, 50)).setTo(1);
+  labels_.setTo(0);
+  labels_(cv::Rect(20, 20, 60, 50)).setTo(1);
   const Rect box{30, 10, 60, 50};
   Plane picture = waves_moved(0, 0);
   Features::Set set;
@@ -171,7 +171,7 @@ TEST_F(FeaturesOf, CornersAreAPatchApartAndInsideTheLabelAndTheBox) {
   EXPECT_EQ(set.size(), first_fill) << "what is there already takes its place";
   for (std::size_t i = 0; i < set.size(); ++i) {
     const Vector2 at = set[i].filter.position();
-    EXPECT_EQ(labels(static_cast<int>(at.y()), static_cast<int>(at.x())), 1);
+    EXPECT_EQ(labels_(static_cast<int>(at.y()), static_cast<int>(at.x())), 1);
     EXPECT_GE(at.x(), box.left);
     EXPECT_LT(at.y(), box.bottom());
     for (std::size_t j = 0; j < i; ++j) {

@@ -65,7 +65,9 @@ Detection seen_at(double x, double y, double disparity = 0) {
 
 /// The same for any box; its area is nine tenths of it.
 Detection box_at(const Rect& box, double disparity = 0) {
-  Detection out = seen_at(box.left + box.width / 2, box.top + box.height / 2, disparity);
+  const int centre_x = box.left + box.width / 2;
+  const int centre_y = box.top + box.height / 2;
+  Detection out = seen_at(centre_x, centre_y, disparity);
   out.box = box;
   out.area = static_cast<int>(box.area() * 9 / 10);
   return out;
@@ -88,13 +90,13 @@ class TrackerOf : public testing::Test {
   void make(const Tracker::Config& c, double focal_baseline = kFocalBaseline) {
     auto created = Tracker::create(c, features(), {kWidth, kHeight, kFocal, focal_baseline}, arena_);
     ASSERT_TRUE(created.has_value());
-    tracker.emplace(*created);
+    tracker_.emplace(*created);
   }
   void step(const std::vector<Detection>& detections, double dt = kDt) {
-    (void)tracker->predict(dt);
-    tracker->update(detections);
+    (void)tracker_->predict(dt);
+    tracker_->update(detections);
   }
-  [[nodiscard]] std::span<const TrackReport> reports() const { return tracker->reports(); }
+  [[nodiscard]] std::span<const TrackReport> reports() const { return tracker_->reports(); }
   [[nodiscard]] int count(TrackState state) const {
     return static_cast<int>(std::count_if(reports().begin(), reports().end(),
                                           [&](const TrackReport& report) { return report.state == state; }));
@@ -120,17 +122,17 @@ class TrackerOf : public testing::Test {
     return nullptr;
   }
 
-  std::optional<Tracker> tracker;
+  std::optional<Tracker> tracker_;
 
  private:
   Arena arena_;
 };
 
 TEST_F(TrackerOf, NothingSeenIsNoTrack) {
-  EXPECT_TRUE(tracker->predict(kDt).empty());
-  tracker->update({});
+  EXPECT_TRUE(tracker_->predict(kDt).empty());
+  tracker_->update({});
   EXPECT_TRUE(reports().empty());
-  EXPECT_EQ(tracker->refused(), 0U);
+  EXPECT_EQ(tracker_->refused(), 0U);
 }
 
 TEST_F(TrackerOf, StraightTargetIsConfirmedByConfirmHitsDetections) {
@@ -223,10 +225,10 @@ TEST_F(TrackerOf, SizeGrowsFastAndShrinksSlowly) {
   const auto width_after = [&](int width) {
     make(config());
     for (int k = 0; k < 20; ++k) step({box_at({100 + 4 * k, 200, 30, 30})});
-    EXPECT_NEAR(tracker->predict(0)[0].box.width, 30, 1);
+    EXPECT_NEAR(tracker_->predict(0)[0].box.width, 30, 1);
     for (int k = 20; k < 25; ++k) step({box_at({100 + 4 * k - (width - 30) / 2, 200, width, 30})});
     EXPECT_EQ(reports().size(), 1U);
-    return tracker->predict(0)[0].box.width;
+    return tracker_->predict(0)[0].box.width;
   };
   EXPECT_GE(width_after(46), 38) << "more than half of the way";
   EXPECT_GE(width_after(20), 26) << "less than half of it";
@@ -578,7 +580,7 @@ TEST_F(TrackerOf, OnlyTargetsFarApartInThePictureOrInDepthAreKnownToBeTwo) {
     for (int k = 0; k < 5; ++k) {
       step({box_at({100 + 3 * k, 100, 24, 40}, 20), box_at({124 + gap + 3 * k, 100, 24, 40}, disparity)});
     }
-    const std::span<const Prediction> predictions = tracker->predict(kDt);
+    const std::span<const Prediction> predictions = tracker_->predict(kDt);
     EXPECT_EQ(predictions.size(), 2U);
     EXPECT_EQ(predictions[0].seen_beside(predictions[1]), predictions[1].seen_beside(predictions[0]));
     return predictions[0].seen_beside(predictions[1]);
@@ -663,7 +665,7 @@ TEST_F(TrackerOf, VelocityComesFromTheTimesNotFromTheFrames) {
 
 TEST_F(TrackerOf, PredictionIsWhereTheTargetWillBe) {
   for (int k = 0; k <= 25; ++k) step({seen_at(100 + 4 * k, 150, 20)});
-  const std::span<const Prediction> predictions = tracker->predict(5 * kDt);
+  const std::span<const Prediction> predictions = tracker_->predict(5 * kDt);
   ASSERT_EQ(predictions.size(), 1U);
   const Prediction& prediction = predictions[0];
   EXPECT_EQ(prediction.id, 1U);
@@ -685,7 +687,7 @@ TEST_F(TrackerOf, PredictionKnowsLooksAndReachOfTheTarget) {
     detection.disparity_reach = 3;
     step({detection});
   }
-  const Prediction prediction = tracker->predict(kDt)[0];
+  const Prediction prediction = tracker_->predict(kDt)[0];
   EXPECT_NEAR(prediction.disparity_reach, 3, 1e-6);
   ASSERT_NE(prediction.appearance, nullptr);
   EXPECT_NEAR(prediction.appearance->explains(painted({}, kRed).appearance), 1, 1e-4);
@@ -709,10 +711,10 @@ TEST_F(TrackerOf, UncertaintyOfThePredictionGrowsWithTime) {
   for (int k = 0; k <= 25; ++k) step({seen_at(100 + 4 * k, 150, 20)});
   double before = 0;
   for (int k = 0; k < 5; ++k) {
-    const Prediction prediction = tracker->predict(kDt)[0];
+    const Prediction prediction = tracker_->predict(kDt)[0];
     EXPECT_GT(prediction.image_sd, before);
     before = prediction.image_sd;
-    tracker->update({});
+    tracker_->update({});
   }
 }
 
@@ -722,7 +724,7 @@ TEST_F(TrackerOf, MonoTargetsAreTrackedInThePicture) {
   ASSERT_EQ(reports().size(), 1U);
   EXPECT_EQ(reports()[0].state, TrackState::kConfirmed);
   EXPECT_FALSE(reports()[0].has_depth);
-  EXPECT_FALSE(tracker->predict(kDt)[0].has_depth);
+  EXPECT_FALSE(tracker_->predict(kDt)[0].has_depth);
 }
 
 TEST_F(TrackerOf, DepthThatComesLaterIsTaken) {
@@ -736,19 +738,24 @@ TEST_F(TrackerOf, DepthThatComesLaterIsTaken) {
 
 std::vector<Detection> grid(int count, double dx) {
   std::vector<Detection> out;
-  for (int i = 0; i < count; ++i) out.push_back(seen_at(40 + 70 * (i % 8) + dx, 30 + 55 * (i / 8)));
+  out.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const int column = i % 8;
+    const int row = i / 8;
+    out.push_back(seen_at(40 + 70 * column + dx, 30 + 55 * row));
+  }
   return out;
 }
 
 TEST_F(TrackerOf, OneMoreThanTheCapacityIsRefusedAndCounted) {
   for (int k = 0; k < 10; ++k) step(grid(Tracker::kMaxTracks, 2 * k));
   EXPECT_EQ(reports().size(), 64U);
-  EXPECT_EQ(tracker->refused(), 0U);
+  EXPECT_EQ(tracker_->refused(), 0U);
   std::vector<Detection> next = grid(Tracker::kMaxTracks, 20);
   next[10] = seen_at(620, 465);
   step(next);
   EXPECT_EQ(reports().size(), 64U);
-  EXPECT_EQ(tracker->refused(), 1U);
+  EXPECT_EQ(tracker_->refused(), 1U);
   for (std::size_t i = 0; i < reports().size(); ++i) EXPECT_EQ(reports()[i].id, i + 1);
 }
 
@@ -757,7 +764,7 @@ TEST_F(TrackerOf, MoreDetectionsThanTheCapacityAreNotLookedAt) {
   many.push_back(seen_at(620, 465));
   step(many);
   EXPECT_EQ(reports().size(), 64U);
-  EXPECT_EQ(tracker->refused(), 0U);
+  EXPECT_EQ(tracker_->refused(), 0U);
 }
 
 TEST_F(TrackerOf, IdsAreInOrderAndNeverUsedAgain) {
@@ -833,14 +840,14 @@ TEST_F(TrackerOf, FeaturesVoteForTheDetectionInWhoseBoxTheyLie) {
     for (int k = 0; k < 15; ++k, x += 6) {
       const Detection object = seen_at(x, 200);
       const Texture texture(object.box);
-      (void)tracker->predict(kDt, texture.picture());
-      tracker->update({&object, 1}, texture.picture(), texture.regions());
+      (void)tracker_->predict(kDt, texture.picture());
+      tracker_->update({&object, 1}, texture.picture(), texture.regions());
     }
     const Texture moved(seen_at(x + 3 * side, 200).box);
-    const Prediction prediction = tracker->predict(kDt, moved.picture())[0];
+    const Prediction prediction = tracker_->predict(kDt, moved.picture())[0];
     const double centre = prediction.box.left + 12;
     const std::vector<Detection> both{seen_at(centre - 12, 200), seen_at(centre + 12, 200)};
-    tracker->update(both);
+    tracker_->update(both);
     ASSERT_EQ(reports().size(), 2U);
     EXPECT_EQ(reports()[0].id, 1U);
     EXPECT_TRUE(reports()[0].measured);
