@@ -188,7 +188,7 @@ TEST(AdaptiveBackground, ClippedBackgroundIsNoMotionUnderOtherExposure) {
     for (int k = 0; k < 20; ++k) watch.step(picture(1, 252));
     watch.look(picture(light, 252));
     EXPECT_EQ(watch.foreground(kAll), 0) << light;
-    watch.look(picture(light, light < 1 ? 200 : 230));  // darker than any light explains
+    watch.look(picture(light, light < 1 ? 200 : 230));   // darker than any light explains
     EXPECT_GE(watch.foreground(bright), 0.95) << light;  // the edge moves no further than its tolerance
   }
 }
