@@ -105,6 +105,7 @@ requires std::floating_point<T>
   made.length = N;
   made.get = [&member] {
     std::vector<double> numbers;
+    numbers.reserve(N);
     for (const T number : member) numbers.push_back(detail::widen(number));
     return Value{numbers};
   };

@@ -73,11 +73,13 @@ TEST(Rules, MergingWhatWasSplitIsRefused) {
 }
 
 TEST(Metres, KeyInMetresNeedsAKnownUnit) {
-  double reach = 0;
-  double speed = 0;
-  double unit = 0;
-  const std::vector<Key> keys{key("unit", unit, 0, 9, "m per unit of T", "d"), key("reach", reach, 0, 9, "m", "d"),
-                              key("speed", speed, 0, 9, "m/s", "d")};
+  struct {
+    double reach = 0;
+    double speed = 0;
+    double unit = 0;
+  } value;
+  const std::vector<Key> keys{key("unit", value.unit, 0, 9, "m per unit of T", "d"),
+                              key("reach", value.reach, 0, 9, "m", "d"), key("speed", value.speed, 0, 9, "m/s", "d")};
   const auto refusal_of = [&](double unit_m) -> std::string {
     Origins origins;
     origins["speed"] = "rig.toml:1:9";
@@ -89,14 +91,14 @@ TEST(Metres, KeyInMetresNeedsAKnownUnit) {
     return {};
   };
   EXPECT_EQ(refusal_of(0), "");  // nothing stated in metres
-  unit = 2;
+  value.unit = 2;
   EXPECT_EQ(refusal_of(0), "");  // the unit itself is no such key
-  speed = 3;
+  value.speed = 3;
   EXPECT_EQ(refusal_of(0),
             "rig.toml:1:9: speed: it is in metres, and the calibration's unit is not known: set calibration.unit_m to "
             "the metres in one unit of T");
   EXPECT_EQ(refusal_of(0.0254), "");
-  reach = 1;
+  value.reach = 1;
   EXPECT_EQ(refusal_of(0).find("default: reach: "), 0U);
 }
 

@@ -13,7 +13,6 @@ namespace {
 using test::const_view;
 using test::edge_like;
 using test::salt;
-using test::view;
 
 BlobExtractor make(Arena& arena, const cv::Mat& mask, const BlobExtractor::Config& config) {
   auto extractor = BlobExtractor::create(config, mask.cols, mask.rows, arena);

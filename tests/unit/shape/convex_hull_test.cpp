@@ -27,7 +27,7 @@ std::vector<cv::Point> pixels_of(const cv::Mat_<std::uint16_t>& labels, int labe
   std::vector<cv::Point> points;
   for (int y = 0; y < labels.rows; ++y) {
     for (int x = 0; x < labels.cols; ++x) {
-      if (labels(y, x) == label) points.push_back({x, y});
+      if (labels(y, x) == label) points.emplace_back(x, y);
     }
   }
   return points;
@@ -90,6 +90,7 @@ TEST(ConvexHull, EqualsOpenCvOnScatteredPixels) {
     std::vector<cv::Point> theirs;
     cv::convexHull(pixels_of(labels), theirs);
     std::vector<Point> expected;
+    expected.reserve(theirs.size());
     for (const cv::Point& p : theirs) expected.push_back({p.x, p.y});
     const Hull ours = hull_of(labels);
     EXPECT_EQ(in_raster_order(list(ours)), in_raster_order(expected)) << "seed " << seed;
@@ -117,7 +118,7 @@ TEST(ConvexHull, LargeDiscKeepsFortyEightVerticesNearItsRim) {
     const Hull hull = hull_of(labels);
     ASSERT_EQ(hull.size(), 48U);
     std::vector<cv::Point> polygon;
-    for (const Point& p : hull) polygon.push_back({p.x, p.y});
+    for (const Point& p : hull) polygon.emplace_back(p.x, p.y);
     EXPECT_TRUE(cv::isContourConvex(polygon));
     double outside = 0;
     for (const cv::Point& p : pixels_of(labels)) outside = std::max(outside, -cv::pointPolygonTest(polygon, p, true));
@@ -179,7 +180,7 @@ TEST(HullFill, EqualsPointInPolygonAndIsClipped) {
     std::vector<cv::Point> polygon;
     for (Point& p : hull) {
       p = {p.x + shift.x, p.y + shift.y};
-      polygon.push_back({p.x, p.y});
+      polygon.emplace_back(p.x, p.y);
     }
     cv::Mat_<std::uint8_t> mask(31, 43, std::uint8_t{7});
     hull_fill(hull, view(mask), 200);
