@@ -14,7 +14,7 @@ using Plane = cv::Mat_<std::uint8_t>;
 
 template <class T>
 ImageView<T> view(cv::Mat_<T>& mat) {
-  return {mat.empty() ? nullptr : mat[0], mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step1())};
+  return {reinterpret_cast<T*>(mat.data), mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step1())};
 }
 
 inline Plane random_plane(cv::Size size, int low, int high, std::uint64_t seed) {

@@ -8,7 +8,7 @@ namespace stereotrack {
 namespace {
 
 ImageView<std::uint8_t> view(cv::Mat_<std::uint8_t>& mat) {
-  return {mat.empty() ? nullptr : mat[0], mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step1())};
+  return {mat.data, mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step1())};
 }
 
 cv::Mat_<std::uint8_t> random_grey(int width, int height, int low, int high, std::uint64_t seed) {

@@ -18,6 +18,7 @@
 #include "firmware-app/render/painter.hpp"
 #include "firmware-app/render/style.hpp"
 #include "scene.hpp"
+#include "tests/support/temp_dir.hpp"
 
 namespace stereotrack::render {
 namespace {
@@ -45,12 +46,9 @@ std::string message_of(Run run) {
 class RendererTest : public ::testing::Test {
  protected:
   RendererTest() {
-    std::string name = (fs::temp_directory_path() / "stereotrack_render_XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
     auto made = Rectifier::create(rig(), kWidth, kHeight, arena_);
     if (made.has_value()) rectifier_ = *made;
   }
-  ~RendererTest() override { fs::remove_all(folder_); }
 
   std::unique_ptr<Renderer> make(const std::string& name, bool stereo = true) {
     return make_renderer((folder_ / name).string(), source_info(stereo), stereo ? &*rectifier_ : nullptr, 0);
@@ -70,7 +68,7 @@ class RendererTest : public ::testing::Test {
 
   Arena arena_;
   std::optional<Rectifier> rectifier_;
-  fs::path folder_;
+  test::TempDir folder_;
 };
 
 class RendererFolder : public RendererTest, public ::testing::WithParamInterface<bool> {};
@@ -187,10 +185,10 @@ TEST_F(RendererTest, FileWhereTheFolderShouldBeIsRefused) {
 
 TEST_F(RendererTest, UnwritableFolderIsRefused) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
-  fs::permissions(folder_, fs::perms::owner_read | fs::perms::owner_exec);
+  fs::permissions(folder_.path(), fs::perms::owner_read | fs::perms::owner_exec);
   EXPECT_THAT(message_of([&] { (void)make("video.mp4"); }), HasSubstr("Permission denied"));
   EXPECT_THAT(message_of([&] { (void)make("pictures"); }), HasSubstr("Permission denied"));
-  fs::permissions(folder_, fs::perms::owner_all);
+  fs::permissions(folder_.path(), fs::perms::owner_all);
 }
 
 TEST_F(RendererTest, PictureThatCannotBeWrittenIsNamedAndLeavesNothing) {
@@ -229,7 +227,7 @@ TEST(Painter, HullLiesOnItsPixels) {
   const cv::Mat with = painter.draw(scene.pair(), scene.result()).clone();
   // raw corner (left + 24, 110), three times as large, header 36 px
   const Point corner = scene.tracks()[0].hull[1];
-  const cv::Vec3b pixel = with.at<cv::Vec3b>(36 + 3 * corner.y + 1, 3 * corner.x + 1);
+  const auto& pixel = with.at<cv::Vec3b>(36 + 3 * corner.y + 1, 3 * corner.x + 1);
   const cv::Scalar wanted = colour_of(1);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(pixel[c], wanted[c], 40);
 }

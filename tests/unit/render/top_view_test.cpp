@@ -27,7 +27,7 @@ class TopViewTest : public ::testing::Test {
   }
   /// Column and row in a view that shows `reach` units.
   static cv::Point pixel(double x, double z, double reach) {
-    return {static_cast<int>(kSide / 2 + x * kFloor / reach), static_cast<int>(kFloor - z * kFloor / reach)};
+    return {static_cast<int>(0.5 * kSide + x * kFloor / reach), static_cast<int>(kFloor - z * kFloor / reach)};
   }
   bool has_dot(cv::Point at, std::uint32_t id) const {
     const cv::Vec3b is = picture_.at<cv::Vec3b>(at);

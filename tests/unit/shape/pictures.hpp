@@ -11,7 +11,7 @@ namespace stereotrack::test {
 
 template <class T>
 ImageView<T> view(cv::Mat_<T>& mat) {
-  return {mat.empty() ? nullptr : mat[0], mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step1())};
+  return {reinterpret_cast<T*>(mat.data), mat.cols, mat.rows, static_cast<std::ptrdiff_t>(mat.step1())};
 }
 
 template <class T>
