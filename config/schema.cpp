@@ -130,8 +130,7 @@ std::vector<Key> keys_of(Configuration& c) {
           "How much a shadow may change the background's own texture."),
       key("shadow.weak_percent", p.shadow.test.weak_percent, 0, 90, "%",
           "Parts of a region that stand out less than this part of the region do, and show the background's texture, "
-          "are "
-          "its reflection or haze; 0: off."),
+          "are its reflection or haze; 0: off."),
       key("shadow.disparity_px", p.shadow.test.disparity_px, 0, 16, "px",
           "Disparities this near count as the background's own."),
       key("shadow.own_depth_px", p.shadow.own_depth_px, 0, 16, "px",

@@ -39,7 +39,7 @@ class ShadowTest {
     int darkest_percent = 40;   ///< smallest ratio of a shadow [%], 1..99
     int chroma_tolerance = 8;   ///< [grey levels], 0..255
     int texture_tolerance = 5;  ///< [grey levels], 0..255
-    int weak_percent = 25;      ///< 0..90; 0 = off
+    int weak_percent = 32;      ///< 0..90; 0 = off
     double disparity_px = 1.0;  ///< disparities this near are the same [px], 0..16
   };
 

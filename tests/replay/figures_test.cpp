@@ -78,7 +78,7 @@ TEST(Figures, ConveyorBoxKeepsOneIdentityOnAStraightPath) {
   const score::PathScore straight = score::follow(rows, {.first_frame = 180, .last_frame = 250, .id = box.id});
   EXPECT_GE(straight.coverage(), 0.98);  // reached: 1.00
   const score::PathFit line = score::fit_path(straight.points, score::kStraight);
-  EXPECT_LE(line.rms_3d, 0.07);                     // reached: 0.069 squares; the target itself
+  EXPECT_LE(line.rms_3d, 0.07);                     // reached: 0.068 squares; the target itself
   EXPECT_NEAR(line.velocity.norm(), 0.173, 0.012);  // reached: 0.166 squares a frame
 }
 
@@ -107,9 +107,10 @@ TEST(Figures, ConveyorBoxHasTheSizeMeasuredByHand) {
     heights += within_a_tenth(row->box.height, truth.box.height) ? 1U : 0U;
     overlaps += evaluation::overlap(row->box, truth.box) >= 0.8 ? 1U : 0U;
   }
-  EXPECT_EQ(widths, 15U);    // reached on 2026-11-22: 15, within 3 %; the target itself
-  EXPECT_GE(heights, 8U);    // reached: 9; target: 15. The belt mirrors the box under its front: up to 24 % too high
-  EXPECT_GE(overlaps, 13U);  // reached: 14; target: 15
+  // Reached on 2026-11-22, the target itself.
+  EXPECT_EQ(widths, 15U);
+  EXPECT_EQ(heights, 15U);
+  EXPECT_EQ(overlaps, 15U);
 }
 
 TEST(Figures, EachPassUnderTheCeilingCameraHasATrack) {
