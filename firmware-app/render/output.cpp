@@ -75,7 +75,10 @@ class VideoOutput final : public Output {
       const auto& name = encoder.fourcc;
       const int fourcc = cv::VideoWriter::fourcc(name[0], name[1], name[2], name[3]);
       try {
-        if (writer_.open(part_.string(), encoder.api, fourcc, encodable(fps), size, true)) return;
+        if (writer_.open(part_.string(), encoder.api, fourcc, encodable(fps), size, true)) {
+          api_ = encoder.api;
+          return;
+        }
       } catch (const cv::Exception&) {
         continue;  // OpenCV throws for a back end that it lacks
       }
@@ -120,7 +123,8 @@ class VideoOutput final : public Output {
   [[nodiscard]] std::uint64_t frames_in_part() const {
     std::uint64_t count = 0;
     try {
-      cv::VideoCapture video(part_.string());
+      // Left to choose, OpenCV would ask every back end, one of which looks for cameras on the USB.
+      cv::VideoCapture video(part_.string(), api_);
       while (video.grab()) ++count;
     } catch (const cv::Exception&) {
       return 0;
@@ -136,6 +140,7 @@ class VideoOutput final : public Output {
   fs::path path_;
   fs::path part_;
   cv::VideoWriter writer_;
+  cv::VideoCaptureAPIs api_ = cv::CAP_FFMPEG;
   std::uint64_t frames_ = 0;
 };
 
