@@ -58,9 +58,9 @@ class AssignmentOf64 : public testing::Test {
   void SetUp() override {
     auto created = Assignment::create(64, 64, arena_);
     ASSERT_TRUE(created.has_value());
-    assignment = *created;
+    assignment_ = *created;
   }
-  Assignment assignment;
+  Assignment assignment_;
 
  private:
   Arena arena_;
@@ -68,18 +68,18 @@ class AssignmentOf64 : public testing::Test {
 
 TEST_F(AssignmentOf64, SumOfAllPairsCountsNotTheBestPair) {
   // Greedy takes (0, 0) and pays 1 + 9; the other pairing costs 2 + 3.
-  EXPECT_EQ(solved(assignment, {2, 2, 100, {1, 2, 3, 9}}), (std::vector<int>{1, 0}));
+  EXPECT_EQ(solved(assignment_, {2, 2, 100, {1, 2, 3, 9}}), (std::vector<int>{1, 0}));
 }
 
 TEST_F(AssignmentOf64, RowStaysAloneWhereThatIsCheaper) {
-  EXPECT_EQ(solved(assignment, {2, 2, 5, {1, 20, 30, 6}}), (std::vector<int>{0, Assignment::kNone}));
-  EXPECT_EQ(solved(assignment, {2, 2, 7, {1, 20, 30, 6}}), (std::vector<int>{0, 1}));
+  EXPECT_EQ(solved(assignment_, {2, 2, 5, {1, 20, 30, 6}}), (std::vector<int>{0, Assignment::kNone}));
+  EXPECT_EQ(solved(assignment_, {2, 2, 7, {1, 20, 30, 6}}), (std::vector<int>{0, 1}));
 }
 
 TEST_F(AssignmentOf64, ForbiddenPairIsNotFormedAtAnyPrice) {
   const double no = Assignment::kForbidden;
-  EXPECT_EQ(solved(assignment, {2, 2, 1e6, {no, no, 3, no}}), (std::vector<int>{Assignment::kNone, 0}));
-  EXPECT_EQ(solved(assignment, {1, 1, 1e6, {no}}), (std::vector<int>{Assignment::kNone}));
+  EXPECT_EQ(solved(assignment_, {2, 2, 1e6, {no, no, 3, no}}), (std::vector<int>{Assignment::kNone, 0}));
+  EXPECT_EQ(solved(assignment_, {1, 1, 1e6, {no}}), (std::vector<int>{Assignment::kNone}));
 }
 
 TEST_F(AssignmentOf64, RandomProblemsUpToSixBySixAreSolvedAsByBruteForce) {
@@ -94,19 +94,19 @@ TEST_F(AssignmentOf64, RandomProblemsUpToSixBySixAreSolvedAsByBruteForce) {
       const bool forbidden = random() % 4 == 0;
       problem.cost.push_back(forbidden ? Assignment::kForbidden : static_cast<double>(random() % 40));
     }
-    ASSERT_EQ(total(problem, solved(assignment, problem)), least(problem, 0, 0)) << trial;
+    ASSERT_EQ(total(problem, solved(assignment_, problem)), least(problem, 0, 0)) << trial;
   }
 }
 
 TEST_F(AssignmentOf64, NoRowsOrNoColumns) {
-  EXPECT_TRUE(solved(assignment, {0, 0, 1, {}}).empty());
-  EXPECT_TRUE(solved(assignment, {0, 3, 1, {}}).empty());
-  EXPECT_EQ(solved(assignment, {2, 0, 1, {}}), (std::vector<int>{Assignment::kNone, Assignment::kNone}));
+  EXPECT_TRUE(solved(assignment_, {0, 0, 1, {}}).empty());
+  EXPECT_TRUE(solved(assignment_, {0, 3, 1, {}}).empty());
+  EXPECT_EQ(solved(assignment_, {2, 0, 1, {}}), (std::vector<int>{Assignment::kNone, Assignment::kNone}));
 }
 
 TEST_F(AssignmentOf64, OneByOne) {
-  EXPECT_EQ(solved(assignment, {1, 1, 5, {4}}), (std::vector<int>{0}));
-  EXPECT_EQ(solved(assignment, {1, 1, 5, {6}}), (std::vector<int>{Assignment::kNone}));
+  EXPECT_EQ(solved(assignment_, {1, 1, 5, {4}}), (std::vector<int>{0}));
+  EXPECT_EQ(solved(assignment_, {1, 1, 5, {6}}), (std::vector<int>{Assignment::kNone}));
 }
 
 TEST_F(AssignmentOf64, FullCapacityFindsAHiddenPermutation) {
@@ -120,8 +120,8 @@ TEST_F(AssignmentOf64, FullCapacityFindsAHiddenPermutation) {
       problem.cost.push_back(column == hidden[static_cast<std::size_t>(row)] ? noise : 2 + 100 * noise);
     }
   }
-  EXPECT_EQ(solved(assignment, problem), hidden);
-  EXPECT_EQ(solved(assignment, problem), hidden) << "a second time";
+  EXPECT_EQ(solved(assignment_, problem), hidden);
+  EXPECT_EQ(solved(assignment_, problem), hidden) << "a second time";
 }
 
 TEST(Assignment, Faults) {
