@@ -31,9 +31,13 @@ constexpr int kWidestColumnGap = 16;  // [px]
 constexpr double kUnique = 1.5;
 constexpr double kLeastCost = 9;    // of a region's match, by noise alone [grey levels squared]
 constexpr double kSurePart = 0.10;  // a match less certain than this part of its disparity says nothing
-// Room around a predicted disparity, in standard deviations and as a fraction, for targets that accelerate.
-constexpr double kRangeSd = 3;
-constexpr double kRangeFraction = 0.25;
+
+// Room around a predicted disparity: standard deviations, and a fraction for targets that accelerate [px].
+double room_around(const Prediction& target) noexcept {
+  constexpr double kSd = 3;
+  constexpr double kFraction = 0.25;
+  return kSd * target.disparity_sd + kFraction * target.disparity + 3;
+}
 
 void fill(ImageView<std::uint8_t> picture, std::uint8_t value) noexcept {
   for (int y = 0; y < picture.height; ++y) std::fill_n(picture.row(y), picture.width, value);
@@ -363,7 +367,7 @@ DisparityRange Pipeline::range_for(const Blob& blob) const noexcept {
     const Rect common = intersect(reach, blob.box);
     if (common.empty()) continue;
     explained = std::max(explained, common.area());
-    const double room = kRangeSd * target.disparity_sd + kRangeFraction * target.disparity + 3;
+    const double room = room_around(target);
     low = std::min(low, target.disparity - room);
     high = std::max(high, target.disparity + room);
   }
@@ -577,7 +581,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
   if (candidate.claim >= 0) {
     const Prediction& target = in.predictions[static_cast<std::size_t>(candidate.claim)];
     if (target.has_depth) {
-      const double room = kRangeSd * target.disparity_sd + kRangeFraction * target.disparity + 3;
+      const double room = room_around(target);
       range.min = std::clamp(static_cast<int>(target.disparity - room), 0, full_range_);
       range.max = std::clamp(static_cast<int>(target.disparity + room) + 1, range.min, full_range_);
     }

@@ -112,9 +112,15 @@ Result<Tracker> Tracker::create(const Config& config, const Features::Config& fe
   self.target_of_row_ = arena.array<int>(kMaxTracks);
   self.detection_of_column_ = arena.array<int>(kMaxDetections);
   self.detection_used_ = arena.array<unsigned char>(kMaxDetections);
-  self.target_used_ = arena.array<unsigned char>(kMaxTracks);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
+}
+
+Rect Tracker::expected_box(const Target& target) noexcept {
+  const Vector2 centre = target.image.position();
+  return {static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
+          static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
+          static_cast<int>(target.width + 0.5), static_cast<int>(target.height + 0.5)};
 }
 
 std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uint8_t> luma) noexcept {
@@ -133,10 +139,7 @@ std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uin
     prediction.vy = target.image.velocity().y();
     prediction.apart = target.apart;
     prediction.independent = target.whole_hits >= kIndependentHits && target.unseen_s <= kClaimsFor;
-    const Vector2 centre = target.image.position();
-    prediction.box = {static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
-                      static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
-                      static_cast<int>(target.width + 0.5), static_cast<int>(target.height + 0.5)};
+    prediction.box = expected_box(target);
     const Matrix2 P = target.image.position_covariance();
     prediction.image_sd = std::sqrt(std::max(P(0, 0), P(1, 1)));
     const double z = target.space.position().z();
@@ -234,7 +237,7 @@ void Tracker::assign(std::span<const Detection> detections, double alone, Wanted
     if (detection_used_[j] == 0) detection_of_column_[static_cast<std::size_t>(columns++)] = static_cast<int>(j);
   }
   for (std::size_t i = 0; i < targets_.size(); ++i) {
-    if (target_used_[i] == 0 && wanted(targets_[i]))
+    if (!targets_[i].measured && wanted(targets_[i]))
       target_of_row_[static_cast<std::size_t>(rows++)] = static_cast<int>(i);
   }
   for (int row = 0; row < rows; ++row) {
@@ -251,7 +254,6 @@ void Tracker::assign(std::span<const Detection> detections, double alone, Wanted
     const auto i = static_cast<std::size_t>(target_of_row_[static_cast<std::size_t>(row)]);
     const auto j = static_cast<std::size_t>(detection_of_column_[static_cast<std::size_t>(column)]);
     take(targets_[i], detections[j], static_cast<std::uint16_t>(j + 1));
-    target_used_[i] = 1;
     detection_used_[j] = 1;
   }
 }
@@ -327,13 +329,11 @@ bool Tracker::is_leaving(const Target& target) const noexcept {
 // Where a target has lost its own detection, the largest part of its region that was taken for something new so far is
 // the target.
 void Tracker::take_over(std::span<const Detection> detections) noexcept {
-  for (std::size_t i = 0; i < targets_.size(); ++i) {
-    Target& target = targets_[i];
-    if (target_used_[i] != 0 || target.state == TrackState::kTentative) continue;
+  for (Target& target : targets_) {
+    if (target.measured || target.state == TrackState::kTentative) continue;
     Target* heir = nullptr;
-    for (std::size_t k = 0; k < targets_.size(); ++k) {
-      Target& child = targets_[k];
-      if (child.parent != target.id || child.state != TrackState::kTentative || target_used_[k] == 0) continue;
+    for (Target& child : targets_) {
+      if (child.parent != target.id || child.state != TrackState::kTentative || !child.measured) continue;
       const auto common = static_cast<double>(intersect(child.box, target.box).area());
       if (common < kInPlacePart * static_cast<double>(std::min(child.box.area(), target.box.area()))) continue;
       if (is_leaving(target) && !is_large(child.box)) continue;
@@ -349,7 +349,6 @@ void Tracker::take_over(std::span<const Detection> detections) noexcept {
     target.space = heir->space;
     target.features = heir->features;
     restart(target, detections[heir->label - 1U], heir->label);
-    target_used_[i] = 1;
     heir->hits = 0;
   }
   keep_targets([](const Target& target) { return target.hits > 0; });
@@ -451,13 +450,7 @@ void Tracker::miss(Target& target) noexcept {
   ++target.misses_in_a_row;
   target.quality *= 0.9;
   if (target.state == TrackState::kConfirmed) target.state = TrackState::kCoasting;
-  // The box and the hull go where the target is expected.
-  const Vector2 centre = target.image.position();
-  const Rect moved{static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
-                   static_cast<int>(std::floor(centre.y() - (target.height - 1) * 0.5 + 0.5)),
-                   std::max(static_cast<int>(target.width + 0.5), 1),
-                   std::max(static_cast<int>(target.height + 0.5), 1)};
-  target.box = intersect(moved, {0, 0, view_.width, view_.height});
+  target.box = intersect(expected_box(target), {0, 0, view_.width, view_.height});
   target.hull.clear();
 }
 
@@ -507,11 +500,10 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
 
 bool Tracker::close_together(const Target& a, const Target& b) const noexcept {
   const double size = std::max({a.width, a.height, b.width, b.height});
-  const int across = std::max(a.box.left, b.box.left) - std::min(a.box.right(), b.box.right());
-  const int down = std::max(a.box.top, b.box.top) - std::min(a.box.bottom(), b.box.bottom());
+  const int shared_columns = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
   const bool shared = !a.whole && !b.whole;
-  const bool stacked = -across * 2 >= std::min(a.box.width, b.box.width);
-  if (std::max(across, down) > (shared ? 2.0 : (stacked ? kTwinStacked : kTwinBeside) * size)) return false;
+  const bool stacked = shared_columns * 2 >= std::min(a.box.width, b.box.width);
+  if (gap(a.box, b.box) > (shared ? 2.0 : (stacked ? kTwinStacked : kTwinBeside) * size)) return false;
   if (!a.has_depth || !b.has_depth) return true;
   const double za = a.space.position().z();
   const double zb = b.space.position().z();
@@ -576,7 +568,6 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
                      ImageView<const std::uint16_t> labels) noexcept {
   detections = detections.first(std::min<std::size_t>(detections.size(), kMaxDetections));
   std::fill(detection_used_.begin(), detection_used_.end(), static_cast<unsigned char>(0));
-  std::fill(target_used_.begin(), target_used_.end(), static_cast<unsigned char>(0));
   for (Target& target : targets_) {
     target.measured = false;
     target.age_s += dt_;

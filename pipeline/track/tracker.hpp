@@ -145,6 +145,7 @@ class Tracker {
     Features::Set features;
   };
 
+  [[nodiscard]] static Rect expected_box(const Target& target) noexcept;
   [[nodiscard]] static double centre_along(double expected, double size, int from, int to, int end) noexcept;
   [[nodiscard]] bool sees_depth(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] Eigen::Vector2d centre(const Target& target, const Detection& detection) const noexcept;
@@ -198,7 +199,6 @@ class Tracker {
   std::span<int> target_of_row_;
   std::span<int> detection_of_column_;
   std::span<unsigned char> detection_used_;
-  std::span<unsigned char> target_used_;
   Assignment assignment_;
   Features features_;
 };
