@@ -6,6 +6,7 @@
 
 #include "pipeline/motion/chroma_test.hpp"
 #include "pipeline/motion/difference.hpp"
+#include "pipeline/motion/ghost_test.hpp"
 #include "pipeline/photometry/chroma.hpp"
 #include "pipeline/photometry/gray.hpp"
 #include "pipeline/photometry/smooth.hpp"
@@ -230,18 +231,18 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   };
   if (!fits(pair.left) || (stereo && !fits(pair.right))) return fail(Fault::kBadSize);
   if (setup_.colour && pair.left.format != PixelFormat::kBgr8) return fail(Fault::kBadFormat);
-  const double dt = started_ ? std::max(seconds_between(last_time_, pair.capture_time), 0.0) : 0.0;
+  dt_ = started_ ? std::max(seconds_between(last_time_, pair.capture_time), 0.0) : 0.0;
   last_time_ = pair.capture_time;
   started_ = true;
   rejections_ = {};
 
   ingest(pair);  // gray 3.1, equalisation 3.2-3.5, chroma 3.17-3.19
   ended(Stage::kIngest);
-  predictions_ = tracker_->predict(dt, left_.y);  // 3.24, 3.26, 3.27: bounds the searches below
-  find_foreground();                              // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
-  ended(Stage::kForeground);                      // contours, opening 3.13-3.15, blobs
-  refine_blobs();                                 // convex hull 3.16, level set
-  if (stereo) find_disparity();                   // block matching 3.6, where something moves
+  predictions_ = tracker_->predict(dt_, left_.y);  // 3.24, 3.26, 3.27: bounds the searches below
+  find_foreground();                               // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
+  ended(Stage::kForeground);                       // contours, opening 3.13-3.15, blobs
+  refine_blobs();                                  // convex hull 3.16, level set
+  if (stereo) find_disparity();                    // block matching 3.6, where something moves
   ended(Stage::kDisparity);
   remove_shadows();  // sigma test 3.20-3.23, or stereo first
   ended(Stage::kShadow);
@@ -513,22 +514,43 @@ void Pipeline::measure_strength() noexcept {
   }
 }
 
-// Regions that stereo knows to be no object, as a whole: light and marks on the background's own surface, and
-// ghosts, of which the background is told.
+// Whether the region lies where a target is expected that moves, or is a small part of any: no ghost of its own.
+bool Pipeline::is_explained(const Blob& blob) const noexcept {
+  constexpr double kSmallPart = 0.25;
+  constexpr double kMoving = 0.1;  // of its size, in the time that a ghost needs to be learnt
+  return std::any_of(predictions_.begin(), predictions_.end(), [&](const Prediction& target) {
+    if (!target.confirmed || intersect(target.box, blob.box).area() * 2 <= blob.box.area()) return false;
+    const double way = std::max(std::abs(target.vx), std::abs(target.vy)) * dt_ * AdaptiveBackground::kGhostFrames;
+    return way > kMoving * std::max(target.box.width, target.box.height) || blob.area < kSmallPart * target.area;
+  });
+}
+
+// Regions that are no object, as a whole: light and marks on the background's own surface, by stereo, and ghosts, by
+// stereo or by their contour, of which the background is told.
 void Pipeline::reject_background() noexcept {
-  if (disparity_.empty()) return;
   const ShadowTest::Input in = shadow_input();
+  const GhostTest::Input look{.y = in.y,
+                              .cb = in.cb,
+                              .cr = in.cr,
+                              .y_background = in.y_background,
+                              .cb_background = in.cb_background,
+                              .cr_background = in.cr_background,
+                              .labels = in.labels};
   for (Blob& blob : blobs_.blobs) {
     ShadowTest::Evidence sum;
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { shadow_test_->weigh(in, x, y, sum); });
     const int known = sum.near + sum.own + sum.behind;
-    if (known * 100 < blob.area * kEvidencePercent) continue;
-    const bool ghost = sum.behind * 100 >= known * kVerdictPercent;
-    const bool surface = (sum.own + sum.behind) * 100 >= known * kVerdictPercent;
-    if (!ghost && !(surface && resembles_background(blob.box, blob.label, blob.area))) continue;
+    const bool enough = known * 100 >= blob.area * kEvidencePercent;
+    const bool behind = enough && sum.behind * 100 >= known * kVerdictPercent;
+    const bool surface = enough && (sum.own + sum.behind) * 100 >= known * kVerdictPercent;
+    const bool nearer = enough && sum.near * 100 >= known * kVerdictPercent;
+    const bool ghost =
+        !behind && !nearer && !is_explained(blob) && GhostTest::measure(look, blob.box, blob.label).is_ghost();
+    if (!behind && !ghost && !(surface && resembles_background(blob.box, blob.label, blob.area))) continue;
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
       blobs_.labels.at(x, y) = 0;
-      if (ghost) moving_.at(x, y) = AdaptiveBackground::kForget;
+      if (behind) moving_.at(x, y) = AdaptiveBackground::kForget;
+      if (ghost) moving_.at(x, y) = AdaptiveBackground::kGhost;
     });
     blob.area = 0;
     ++rejections_[static_cast<std::size_t>(Rejection::kOwnSurface)];

@@ -109,6 +109,7 @@ class Pipeline {
   void match_dense() noexcept;
   void match_blob(const Blob& blob) noexcept;
   void renew_background_disparity() noexcept;
+  [[nodiscard]] bool is_explained(const Blob& blob) const noexcept;
   void reject_background() noexcept;
   void measure_strength() noexcept;
   [[nodiscard]] bool resembles_background(const Rect& box, std::uint16_t label, int area) noexcept;
@@ -131,6 +132,7 @@ class Pipeline {
   int frames_ = 0;
   int full_range_ = 0;
   CaptureTime last_time_{};
+  double dt_ = 0;  ///< since the frame before [s]
   std::span<const Prediction> predictions_;
   BlobSet blobs_;
   std::span<std::uint8_t> typical_distance_;  ///< by label: 75th percentile of the distance

@@ -61,6 +61,8 @@ class AdaptiveBackground {
   /// Marks in the mask of learn().
   static constexpr std::uint8_t kForeground = 255;  ///< not to be learnt as background
   static constexpr std::uint8_t kForget = 1;        ///< the background here is wrong: start anew with this look
+  static constexpr std::uint8_t kGhost = 2;         ///< foreground; learnt once it looks so for kGhostFrames
+  static constexpr int kGhostFrames = 4;
 
   /// Learns from the picture that distance() saw. mask: 0 where it is background, else one of the marks above.
   void learn(const Planes& picture, ImageView<const std::uint8_t> mask) noexcept;

@@ -23,6 +23,8 @@ constexpr int kPriorFrames = 8;
 // How far a pixel may be from its candidate and still be the same look [8.8].
 constexpr int kCandidateReach = 12 * 256;
 constexpr int kForget = AdaptiveBackground::kForget;
+constexpr int kGhost = AdaptiveBackground::kGhost;
+constexpr int kGhostFrames = AdaptiveBackground::kGhostFrames;
 
 }  // namespace
 }  // namespace stereotrack
@@ -105,8 +107,8 @@ int learn_mixed(const LearnRow& row, const LearnRates& rates, int x, Word mask, 
     renewed = hn::Or(renewed, hn::Not(at_least(word(kCandidateReach), apart)));
   }
   const Word seen = hn::IfThenElse(renewed, one, hn::Add(candidate_age, one));
-  const auto lasting =
-      hn::Or(hn::Not(at_least(hn::Max(age, word(kPriorFrames)), seen)), at_least(seen, word(rates.absorb)));
+  const Word enough = hn::IfThenElse(hn::Eq(mask, word(kGhost)), word(kGhostFrames), word(rates.absorb));
+  const auto lasting = hn::Or(hn::Not(at_least(hn::Max(age, word(kPriorFrames)), seen)), at_least(seen, enough));
   const auto exchanged = hn::And(hn::AndNot(renewed, moving), lasting);
 
   const Word slower = hn::Add(rate, word(kPriorFrames));
@@ -260,7 +262,8 @@ void learn_candidate(const LearnRow& row, const LearnRates& rates, int x) noexce
     candidate = static_cast<std::uint16_t>(candidate + apart / std::min<int>(candidate_age, rates.window));
   }
   // A look must last at least kPriorFrames: a slow object in the first frames is no background.
-  if (candidate_age <= std::max<int>(age, kPriorFrames) && candidate_age < rates.absorb) return;
+  const int enough = row.mask[x] == kGhost ? kGhostFrames : rates.absorb;
+  if (candidate_age <= std::max<int>(age, kPriorFrames) && candidate_age < enough) return;
   for (int c = 0; c < row.count; ++c) {
     std::swap(row.channels[c].mean[x], row.channels[c].candidate[x]);
     row.channels[c].deviation[x] = kPriorDeviation;

@@ -17,7 +17,7 @@ struct LearnRow {
   int count = 1;                           ///< 1..3
   std::uint16_t* age = nullptr;            ///< frames that looked like the mean; 0 = nothing known
   std::uint16_t* candidate_age = nullptr;  ///< frames that looked like the candidate
-  const std::uint8_t* mask = nullptr;      ///< 0 background, 1 AdaptiveBackground::kForget, else foreground
+  const std::uint8_t* mask = nullptr;      ///< 0 background, else one of AdaptiveBackground's marks
 };
 
 struct LearnRates {

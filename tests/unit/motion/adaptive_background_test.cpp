@@ -321,6 +321,25 @@ TEST(AdaptiveBackground, ForgottenPixelStartsAnewWithItsPresentLook) {
   EXPECT_EQ(watch.background->luma().at(43, 25), 200);
 }
 
+// A ghost's pixels are learnt once they have looked the same kGhostFrames long; what moves through is not.
+TEST(AdaptiveBackground, GhostIsLearntOnceItStandsStill) {
+  const cv::Rect place(40, 20, 16, 14);
+  for (const bool still : {true, false}) {
+    Watch watch;
+    Plane picture(kSize, std::uint8_t{100});
+    for (int t = 0; t < 50; ++t) watch.step(picture);
+    for (int t = 1; t <= AdaptiveBackground::kGhostFrames; ++t) {
+      picture(place).setTo(still ? 200 : 150 + 20 * t);
+      watch.look(picture);
+      EXPECT_GT(watch.foreground(place), 0.99);
+      watch.mask(place).setTo(AdaptiveBackground::kGhost);
+      watch.background->learn({view(picture), {}, {}}, view(watch.mask));
+    }
+    watch.look(picture);
+    EXPECT_EQ(watch.foreground(inner(place, 1)), still ? 0 : 1);
+  }
+}
+
 TEST(AdaptiveBackground, ObjectOfTheBackgroundsLumaIsSeenByItsColour) {
   const cv::Rect object(40, 20, 16, 14);
   Plane y(kSize, std::uint8_t{110});

@@ -63,7 +63,7 @@ State empty_state(std::size_t size) {
   return state;
 }
 
-/// A row of a scene with background, foreground that stays, comes and goes, and forgetting.
+/// A row of a scene with background, foreground that stays, comes and goes, ghosts, and forgetting.
 Sight sight_of(std::size_t size, Draw& draw, int frame) {
   Sight sight;
   for (auto& plane : sight.now) plane.resize(size);
@@ -75,6 +75,7 @@ Sight sight_of(std::size_t size, Draw& draw, int frame) {
     }
     sight.mask[x] = object || draw(0, 29) == 0 ? 255 : 0;
     if (draw(0, 199) == 0) sight.mask[x] = 1;
+    if (x % 50 > 40 && object) sight.mask[x] = 2;
     if (x >= 130 && x < 200) sight.mask[x] = 0;  // some vectors are background as a whole
   }
   return sight;
@@ -161,7 +162,7 @@ TEST(LearnKernel, AnyStateIsTheReference) {
       state.age[x] = static_cast<std::uint16_t>(draw(0, 1) == 0 ? draw(0, 12) : draw(0, rates.absorb));
       state.candidate_age[x] =
           static_cast<std::uint16_t>(draw(0, 1) == 0 ? draw(0, 12) % rates.absorb : draw(0, rates.absorb - 1));
-      sight.mask[x] = static_cast<std::uint8_t>(std::array{0, 1, 255, 7, 255}[static_cast<std::size_t>(draw(0, 4))]);
+      sight.mask[x] = static_cast<std::uint8_t>(std::array{0, 1, 255, 2, 255}[static_cast<std::size_t>(draw(0, 4))]);
     }
     const State before = state;
     const int changed = learn(learn_row_reference, state, sight, 3, rates, 0, kSize);
