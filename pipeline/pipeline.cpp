@@ -40,6 +40,12 @@ double room_around(const Prediction& target) noexcept {
   return kSd * target.disparity_sd + kFraction * target.disparity + 3;
 }
 
+// Where a target may be, three standard deviations around what is expected.
+Rect reach_of(const Prediction& target) noexcept {
+  const int slack = static_cast<int>(3 * target.image_sd + 2);
+  return {target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack, target.box.height + 2 * slack};
+}
+
 void fill(ImageView<std::uint8_t> picture, std::uint8_t value) noexcept {
   for (int y = 0; y < picture.height; ++y) std::fill_n(picture.row(y), picture.width, value);
 }
@@ -362,10 +368,7 @@ DisparityRange Pipeline::range_for(const Blob& blob) const noexcept {
   std::int64_t explained = 0;
   for (const Prediction& target : predictions_) {
     if (!target.confirmed || !target.has_depth) continue;
-    const int slack = static_cast<int>(3 * target.image_sd + 2);
-    const Rect reach{target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack,
-                     target.box.height + 2 * slack};
-    const Rect common = intersect(reach, blob.box);
+    const Rect common = intersect(reach_of(target), blob.box);
     if (common.empty()) continue;
     explained = std::max(explained, common.area());
     const double room = room_around(target);
@@ -514,12 +517,12 @@ void Pipeline::measure_strength() noexcept {
   }
 }
 
-// Whether the region lies where a target is expected that moves, or is a small part of any: no ghost of its own.
+// Whether the region lies where a target may be that moves, or is a small part of any: no ghost of its own.
 bool Pipeline::is_explained(const Blob& blob) const noexcept {
   constexpr double kSmallPart = 0.25;
   constexpr double kMoving = 0.1;  // of its size, in the time that a ghost needs to be learnt
   return std::any_of(predictions_.begin(), predictions_.end(), [&](const Prediction& target) {
-    if (!target.confirmed || intersect(target.box, blob.box).area() * 2 <= blob.box.area()) return false;
+    if (!target.confirmed || intersect(reach_of(target), blob.box).area() * 2 <= blob.box.area()) return false;
     const double way = std::max(std::abs(target.vx), std::abs(target.vy)) * dt_ * AdaptiveBackground::kGhostFrames;
     return way > kMoving * std::max(target.box.width, target.box.height) || blob.area < kSmallPart * target.area;
   });
