@@ -76,6 +76,7 @@ struct SceneEntry {
   Scene (*make)(std::uint64_t seed);
 };
 [[nodiscard]] const std::vector<SceneEntry>& scenes();
+[[nodiscard]] std::string scene_names();  ///< "eleven, occupied..."
 
 /// Pixels that the picture of a shape (a sphere) can touch, not clipped. Empty if all of it is nearer
 /// than 0.2 m or behind the camera.

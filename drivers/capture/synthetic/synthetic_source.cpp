@@ -16,12 +16,10 @@ namespace {
 using namespace synthetic;  // NOLINT(google-build-using-namespace): this file is the engine's outer wall
 
 const SceneEntry& find_scene(const std::string& name) {
-  std::string known;
   for (const SceneEntry& entry : scenes()) {
     if (entry.name == name) return entry;
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
   }
-  throw SceneError("synthetic:" + name + ": no such scene; there is " + known);
+  throw SceneError("synthetic:" + name + ": no such scene; there is " + scene_names());
 }
 
 void check(const std::string& name, const SyntheticOptions& o) {
@@ -157,8 +155,9 @@ void SyntheticSource::work_out_truth() {
         if (view.darkening(x, y) > 0.16) truth_.labels[i] = GroundTruth::kShadow;
         continue;
       }
-      truth_.labels[i] = GroundTruth::kMoving;
-      Sum& sum = sums[static_cast<std::size_t>(owner.actor)];
+      const auto actor = static_cast<std::size_t>(owner.actor);
+      truth_.labels[i] = posed_[actor].undecided ? GroundTruth::kUnknown : GroundTruth::kMoving;
+      Sum& sum = sums[actor];
       const double z = 1.0 / owner.inverse_depth;
       sum.box = unite(sum.box, {x, y, 1, 1});
       sum.x += (x - camera.cx) / camera.f * z;
@@ -201,7 +200,7 @@ void SyntheticSource::work_out_truth() {
     const Sum& s = sums[a];
     if (s.count == 0) continue;
     truth_.objects.push_back({posed_[a].id, s.box, s.x / s.count, s.y / s.count, s.z / s.count, s.count, s.hidden,
-                              std::max(s.whole, s.count)});
+                              std::max(s.whole, s.count), posed_[a].undecided});
   }
   std::sort(truth_.objects.begin(), truth_.objects.end(),
             [](const TrueObject& a, const TrueObject& b) { return a.id < b.id; });

@@ -1,13 +1,21 @@
 #include "drivers/capture/synthetic/scene.hpp"
 #include "drivers/capture/synthetic/scenes/eleven.hpp"
+#include "drivers/capture/synthetic/scenes/occupied.hpp"
 
 namespace stereotrack::capture::synthetic {
 
 const std::vector<SceneEntry>& scenes() {
   static const std::vector<SceneEntry> all{
       {"eleven", "a yard with eleven moving things: people, a dog, a trolley, balls, a drone...", &make_eleven},
+      {"occupied", "the yard with six things that stand there in frame 1 and leave one by one", &make_occupied},
   };
   return all;
+}
+
+std::string scene_names() {
+  std::string names;
+  for (const SceneEntry& entry : scenes()) names += (names.empty() ? "" : ", ") + std::string(entry.name);
+  return names;
 }
 
 }  // namespace stereotrack::capture::synthetic
