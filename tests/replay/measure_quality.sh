@@ -210,6 +210,7 @@ END
     done
   done <<END
 occupied 0
+exposure_step 30
 END
   echo
 }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,6 +55,30 @@ struct Light {
   Vec3 bounce;                ///< on a surface that faces down
 };
 
+/// A floodlight that hangs over the yard. It is wide: nobody throws a shadow in it but right beneath himself.
+///     light on a surface = light facing cone / distance^2,   cone: 1 within cos_full of straight down, 0 from cos_none
+struct Lamp {
+  Vec3 position;
+  Vec3 light;  ///< at 1 m
+  double cos_full = 0.9;
+  double cos_none = 0.7;
+
+  [[nodiscard]] Vec3 on(Vec3 point, Vec3 normal) const noexcept {
+    const Vec3 to = position - point;
+    const double d2 = dot(to, to);
+    const double d = std::sqrt(d2);
+    const double facing = dot(to, normal);
+    if (facing <= 0 || d2 <= 0) return {};
+    return light * (facing / (d * d2) * smoothstep(cos_none, cos_full, to.y / d));
+  }
+};
+
+/// What changes for all of both pictures from one moment to the next.
+struct Moment {
+  double exposure = 1;  ///< factor on the gain of both cameras
+  double lamp = 0;      ///< how bright the scene's lamp burns
+};
+
 /// Everything that can be pictured, and who comes by.
 struct Scene {
   std::string name;
@@ -61,6 +87,8 @@ struct Scene {
   Light light;
   std::vector<Material> materials;
   std::vector<Shape> statics;  ///< at least two; the first is the floor, which hides nothing from the sun
+  std::optional<Lamp> lamp;
+  std::function<Moment(double t_s)> moment;  ///< none: nothing changes but the clouds
   Vec3 horizon_colour;
   Vec3 zenith_colour;
   double act_s = 0;      ///< every so many seconds a new cast comes on, the old one gone

@@ -102,11 +102,13 @@ Next SyntheticSource::next(FramePair& out) noexcept {
     for (const Actor& actor : cast_) {
       if (pose(actor, t, posed_[posed_count_])) ++posed_count_;
     }
-    const LightLevel level = light_at(options_.seed, t);
+    const Moment moment = scene_.moment ? scene_.moment(t) : Moment{};
+    LightLevel level = light_at(options_.seed, t);
+    level.lamp = moment.lamp;
     const std::span<const PosedActor> actors(posed_.data(), posed_count_);
     const auto render = [&](std::size_t i) {
       views_[i].cast_actors(actors);
-      views_[i].expose(level, sensors_[i], done_, pixels_[i].data());
+      views_[i].expose(level, moment.exposure, sensors_[i], done_, pixels_[i].data());
     };
     render(0);
     render(1);

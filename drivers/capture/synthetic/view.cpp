@@ -94,6 +94,7 @@ View::View(const Scene& scene, const PinholeCamera& camera)
   const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   sky_light_.resize(3 * pixels);
   sun_light_.resize(3 * pixels);
+  if (scene.lamp) lamp_light_.resize(3 * pixels);
   normal_.resize(3 * pixels);
   center_depth_.resize(pixels);
   still_depth_.resize(kSamples * pixels);
@@ -130,6 +131,15 @@ void View::cast_statics_rows(int first, int last, std::span<const Rect> boxes) {
   }
   std::size_t last_shader = 0;    // what hid the sun last is likely to hide it again
   std::vector<std::size_t> near;  // shapes that this tile may show
+  // Nothing is higher than the lamp on the way to it.
+  const auto lamp_on = [&](Vec3 point, Vec3 normal) {
+    const Vec3 light = scene_.lamp->on(point, normal);
+    if (light.y <= 0) return light;
+    const Vec3 to = normalized(scene_.lamp->position - point);
+    const bool hidden = std::any_of(shaders.begin(), shaders.end(),
+                                    [&](std::size_t i) { return blocks(scene_.statics[i], point, to); });
+    return hidden ? Vec3{} : light;
+  };
 
   for (int top = first; top < last; top += kTile) {
     for (int left = 0; left < camera_.width; left += kTile) {
@@ -144,6 +154,7 @@ void View::cast_statics_rows(int first, int last, std::span<const Rect> boxes) {
           const std::size_t pixel = index(x, y);
           Vec3 sky_sum;
           Vec3 sun_sum;
+          Vec3 lamp_sum;
           Vec3 center_normal;
           double center_open = 1.0;
           for (std::size_t k = kStillOffsets.size(); k-- > 0;) {
@@ -178,9 +189,10 @@ void View::cast_statics_rows(int first, int last, std::span<const Rect> boxes) {
             const Vec3 colour =
                 reflectance(scene_.materials[static_cast<std::size_t>(shape.material)], shape, local, flat);
             sky_sum = sky_sum + colour * skylight(scene_.light, normal) * center_open;
+            const Vec3 above = point + normal * 1e-3;
+            if (scene_.lamp) lamp_sum = lamp_sum + colour * lamp_on(above, normal);
             const double facing = dot(normal, sun[k]);
             if (facing <= 0) continue;
-            const Vec3 above = point + normal * 1e-3;
             bool hidden = blocks(scene_.statics[shaders[last_shader]], above, sun[k]);
             for (std::size_t i = 0; i < shaders.size() && !hidden; ++i) {
               hidden = blocks(scene_.statics[shaders[i]], above, sun[k]);
@@ -196,6 +208,7 @@ void View::cast_statics_rows(int first, int last, std::span<const Rect> boxes) {
           };
           store(sky_light_, sky_sum * weight);
           store(sun_light_, sun_sum * weight);
+          if (scene_.lamp) store(lamp_light_, lamp_sum * weight);
           store(normal_, center_normal);
         }
       }
@@ -382,6 +395,7 @@ Vec3 View::shade(const Part& part, std::size_t sample, double u, double v, doubl
                                     [&](std::uint16_t i) { return blocks(scene_.statics[i], above, to_sun_[sample]); });
     if (!hidden) light = light + scene_.light.sun * (facing * level.sun);
   }
+  if (lamp_ > 0) light = light + scene_.lamp->on(point, normal) * level.lamp;
   return colour * light;
 }
 
@@ -399,12 +413,17 @@ double View::shadow(int x, int y) const noexcept {
   return static_cast<double>(sum) / (16.0 * kSamples);
 }
 
-void View::expose(const LightLevel& level, const Sensor& sensor, std::uint64_t frame, std::uint8_t* bgr) {
+void View::expose(const LightLevel& level, double exposure, const Sensor& sensor, std::uint64_t frame,
+                  std::uint8_t* bgr) {
   const auto sky = static_cast<float>(level.sky);
   const auto sun = static_cast<float>(level.sun);
+  lamp_ = lamp_light_.empty() ? 0.0F : static_cast<float>(level.lamp);
   for (int y = 0; y < camera_.height; ++y) {
     const std::size_t start = 3 * index(0, y);
     for (std::size_t i = 0; i < row_.size(); ++i) row_[i] = sky_light_[start + i] * sky + sun_light_[start + i] * sun;
+    if (lamp_ > 0) {
+      for (std::size_t i = 0; i < row_.size(); ++i) row_[i] += lamp_light_[start + i] * lamp_;
+    }
     const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
     for (int x = first; x < last; ++x) {
       const std::size_t pixel = index(x, y);
@@ -413,6 +432,10 @@ void View::expose(const LightLevel& level, const Sensor& sensor, std::uint64_t f
       const std::size_t out = 3 * static_cast<std::size_t>(x);
       for (std::size_t c = 0; c < 3; ++c) {
         row_[out + c] = sky_light_[3 * pixel + c] * open + sun_light_[3 * pixel + c] * lit;
+      }
+      if (lamp_ > 0) {
+        const float lamp = lamp_ * (1.0F - static_cast<float>(contact_[pixel]) / 255.0F);
+        for (std::size_t c = 0; c < 3; ++c) row_[out + c] += lamp_light_[3 * pixel + c] * lamp;
       }
       const std::uint16_t* who = &who_[kSamples * pixel];
       Vec3 sum;
@@ -429,7 +452,7 @@ void View::expose(const LightLevel& level, const Sensor& sensor, std::uint64_t f
       row_[out + 1] = row_[out + 1] * still + static_cast<float>(sum.y / kSamples);
       row_[out + 2] = row_[out + 2] * still + static_cast<float>(sum.z / kSamples);
     }
-    sensor.expose(row_.data(), y, frame, bgr + start);
+    sensor.expose(row_.data(), y, frame, bgr + start, exposure);
   }
 }
 
@@ -475,8 +498,13 @@ double View::darkening(int x, int y) const noexcept {
     sky += kLuma[c] * static_cast<double>(sky_light_[3 * pixel + c]);
     sun += kLuma[c] * static_cast<double>(sun_light_[3 * pixel + c]);
   }
-  const double lost = sky * (contact_[pixel] / 255.0) + sun * shadow(x, y);
-  return sky + sun > 0 ? lost / (sky + sun) : 0.0;
+  double lamp = 0;
+  if (lamp_ > 0) {
+    for (std::size_t c = 0; c < 3; ++c) lamp += kLuma[c] * static_cast<double>(lamp_ * lamp_light_[3 * pixel + c]);
+  }
+  const double lost = (sky + lamp) * (contact_[pixel] / 255.0) + sun * shadow(x, y);
+  const double all = sky + sun + lamp;
+  return all > 0 ? lost / all : 0.0;
 }
 
 }  // namespace stereotrack::capture::synthetic

@@ -14,6 +14,7 @@ namespace stereotrack::capture::synthetic {
 struct LightLevel {
   double sun = 1;
   double sky = 1;
+  double lamp = 0;
 };
 
 /// A scene ray-cast into one camera.
@@ -33,7 +34,7 @@ class View {
   /// Casts the actors into this view.
   void cast_actors(std::span<const PosedActor> actors);
   /// The picture of the last cast_actors(): width x height, blue green red, rows without gaps.
-  void expose(const LightLevel& level, const Sensor& sensor, std::uint64_t frame, std::uint8_t* bgr);
+  void expose(const LightLevel& level, double exposure, const Sensor& sensor, std::uint64_t frame, std::uint8_t* bgr);
 
   [[nodiscard]] const PinholeCamera& camera() const noexcept { return camera_; }
 
@@ -75,6 +76,7 @@ class View {
   // What stands still, per pixel.
   std::vector<float> sky_light_;     ///< 3: reflected skylight
   std::vector<float> sun_light_;     ///< 3: reflected sunlight
+  std::vector<float> lamp_light_;    ///< 3: reflected light of the lamp; empty without one
   std::vector<float> normal_;        ///< 3: world
   std::vector<float> center_depth_;  ///< at the pixel's centre [m]; kSkyDepth where nothing is
   std::vector<float> still_depth_;   ///< kSamples
@@ -89,6 +91,7 @@ class View {
   std::vector<Rect> dirty_;                   ///< what this frame's actors may have touched
   std::vector<std::array<int, 2>> row_span_;  ///< the same, by rows: first and one past the last column
   std::vector<float> row_;
+  float lamp_ = 0;  ///< how bright the lamp burns
 };
 
 }  // namespace stereotrack::capture::synthetic

@@ -1,5 +1,6 @@
 #include "drivers/capture/synthetic/scene.hpp"
 #include "drivers/capture/synthetic/scenes/eleven.hpp"
+#include "drivers/capture/synthetic/scenes/exposure_step.hpp"
 #include "drivers/capture/synthetic/scenes/occupied.hpp"
 
 namespace stereotrack::capture::synthetic {
@@ -8,6 +9,7 @@ const std::vector<SceneEntry>& scenes() {
   static const std::vector<SceneEntry> all{
       {"eleven", "a yard with eleven moving things: people, a dog, a trolley, balls, a drone...", &make_eleven},
       {"occupied", "the yard with six things that stand there in frame 1 and leave one by one", &make_occupied},
+      {"exposure_step", "the yard while exposure jumps and a floodlight goes on and off", &make_exposure_step},
   };
   return all;
 }

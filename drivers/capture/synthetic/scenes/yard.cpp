@@ -81,7 +81,7 @@ Vec3 print_colour(Random& random) {
   return rgb(ink[0], ink[1], ink[2]);
 }
 
-void build_yard(Scene& scene, Random& random) {
+YardPlan build_yard(Scene& scene, Random& random) {
   Yard yard(scene, random);
   const Vec3 dark = rgb(40, 40, 42);
   const Vec3 pale = rgb(196, 192, 182);
@@ -185,6 +185,7 @@ void build_yard(Scene& scene, Random& random) {
   scene.light.bounce = {0.20, 0.19, 0.17};
   scene.horizon_colour = {0.70, 0.74, 0.79};
   scene.zenith_colour = {0.40, 0.52, 0.70};
+  return {yard.mirror(), {lamp_x * yard.mirror(), 7.0, 9.9}};
 }
 
 Wardrobe make_wardrobe(Scene& scene, Random& random) {

@@ -14,7 +14,11 @@ namespace stereotrack::capture::synthetic {
 /// The place where the scenes play: a paved yard before a brick wall with a gate, windows and posters, a
 /// container, a shed and small things to look past; houses and trees beyond. Colours, places and which side
 /// is which come from `random`. Fills statics, light and sky of `scene`; people may go at z = 4.5 .. 9.4.
-void build_yard(Scene& scene, Random& random);
+struct YardPlan {
+  double mirror = 1;  ///< -1: left and right are changed
+  Vec3 lamp;          ///< the top of the lamp post
+};
+YardPlan build_yard(Scene& scene, Random& random);
 
 /// A colour as print and cloth have it.
 [[nodiscard]] Vec3 print_colour(Random& random);
