@@ -211,6 +211,7 @@ END
   done <<END
 occupied 0
 exposure_step 30
+shake 30
 END
   echo
 }

@@ -34,6 +34,13 @@ struct PinholeCamera {
   [[nodiscard]] Vec3 to_camera(Vec3 world) const noexcept { return axes.to_local(world - position); }
 };
 
+/// How far a rig is turned from where it looks at rest, about its own axes; small [rad].
+struct Sway {
+  double yaw = 0;    ///< to the right: the picture goes to the left
+  double pitch = 0;  ///< upwards: the picture goes down
+  double roll = 0;   ///< clockwise: the picture turns counter-clockwise
+};
+
 /// Two cameras side by side on a mast, looking slightly down: rectified by construction.
 struct Rig {
   double height_m = 3.0;
@@ -43,6 +50,8 @@ struct Rig {
   double baseline_m = 0.25;
 
   [[nodiscard]] PinholeCamera camera(int index, int width, int height) const noexcept;  ///< 0 left, 1 right
+  /// The same while the mast sways: the rig turns as one about the middle between the cameras.
+  [[nodiscard]] PinholeCamera camera(int index, int width, int height, const Sway& sway) const noexcept;
   [[nodiscard]] StereoCalibration calibration(int width, int height) const;
 };
 
@@ -77,6 +86,7 @@ struct Lamp {
 struct Moment {
   double exposure = 1;  ///< factor on the gain of both cameras
   double lamp = 0;      ///< how bright the scene's lamp burns
+  Sway sway;            ///< where the scene sways
 };
 
 /// Everything that can be pictured, and who comes by.
@@ -89,6 +99,7 @@ struct Scene {
   std::vector<Shape> statics;  ///< at least two; the first is the floor, which hides nothing from the sun
   std::optional<Lamp> lamp;
   std::function<Moment(double t_s)> moment;  ///< none: nothing changes but the clouds
+  bool sways = false;                        ///< the mast; how says `moment`
   Vec3 horizon_colour;
   Vec3 zenith_colour;
   double act_s = 0;      ///< every so many seconds a new cast comes on, the old one gone

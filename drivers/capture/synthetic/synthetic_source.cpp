@@ -107,6 +107,9 @@ Next SyntheticSource::next(FramePair& out) noexcept {
     level.lamp = moment.lamp;
     const std::span<const PosedActor> actors(posed_.data(), posed_count_);
     const auto render = [&](std::size_t i) {
+      if (scene_.sways) {
+        views_[i].turn(scene_.rig.camera(static_cast<int>(i), options_.width, options_.height, moment.sway));
+      }
       views_[i].cast_actors(actors);
       views_[i].expose(level, moment.exposure, sensors_[i], done_, pixels_[i].data());
     };

@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "drivers/capture/synthetic/scene.hpp"
 #include "drivers/capture/synthetic/sensor.hpp"
+#include "drivers/capture/synthetic/still_picture.hpp"
 
 namespace stereotrack::capture::synthetic {
 
@@ -19,18 +21,17 @@ struct LightLevel {
 
 /// A scene ray-cast into one camera.
 ///
-/// What stands still is cast once, with 13 rays a pixel, and kept in two parts, sunlight and skylight, so
-/// that a shadow or a cloud only weighs them. A frame costs rays where objects and their shadows can be:
+/// What stands still is cast once (see StillPicture). A frame costs rays where objects and their shadows can be:
 /// four a pixel for objects (shape, texture, sun, shadows of everything else), four towards the sun for
 /// shadows on what stands still.
 ///
 /// Memory: about 90 bytes a pixel. One thread an instance.
 class View {
  public:
-  static constexpr std::size_t kSamples = 4;
-
   View(const Scene& scene, const PinholeCamera& camera);
 
+  /// From here on the picture is that of this camera; only where the scene sways.
+  void turn(const PinholeCamera& camera);
   /// Casts the actors into this view.
   void cast_actors(std::span<const PosedActor> actors);
   /// The picture of the last cast_actors(): width x height, blue green red, rows without gaps.
@@ -55,8 +56,6 @@ class View {
     std::vector<std::uint16_t> static_shaders;  ///< the same of what stands still
   };
 
-  void cast_statics();
-  void cast_statics_rows(int first, int last, std::span<const Rect> boxes);
   void cast_shadow(const Part& part);
   void cast_contact(const Shape& sphere);
   void find_shaders(std::size_t first, std::size_t count);
@@ -73,13 +72,8 @@ class View {
   Rect frame_;
   std::array<Vec3, kSamples> to_sun_;  ///< directions into the sun's disc, unit
 
-  // What stands still, per pixel.
-  std::vector<float> sky_light_;     ///< 3: reflected skylight
-  std::vector<float> sun_light_;     ///< 3: reflected sunlight
-  std::vector<float> lamp_light_;    ///< 3: reflected light of the lamp; empty without one
-  std::vector<float> normal_;        ///< 3: world
-  std::vector<float> center_depth_;  ///< at the pixel's centre [m]; kSkyDepth where nothing is
-  std::vector<float> still_depth_;   ///< kSamples
+  StillPicture still_;                     ///< as camera_ sees it now
+  std::optional<TurnableStill> turnable_;  ///< where the scene sways
 
   // This frame, per pixel.
   std::vector<float> depth_;           ///< kSamples

@@ -2,6 +2,7 @@
 #include "drivers/capture/synthetic/scenes/eleven.hpp"
 #include "drivers/capture/synthetic/scenes/exposure_step.hpp"
 #include "drivers/capture/synthetic/scenes/occupied.hpp"
+#include "drivers/capture/synthetic/scenes/shake.hpp"
 
 namespace stereotrack::capture::synthetic {
 
@@ -10,6 +11,7 @@ const std::vector<SceneEntry>& scenes() {
       {"eleven", "a yard with eleven moving things: people, a dog, a trolley, balls, a drone...", &make_eleven},
       {"occupied", "the yard with six things that stand there in frame 1 and leave one by one", &make_occupied},
       {"exposure_step", "the yard while exposure jumps and a floodlight goes on and off", &make_exposure_step},
+      {"shake", "the yard seen from a mast that sways by up to 4 px", &make_shake},
   };
   return all;
 }
