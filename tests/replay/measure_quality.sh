@@ -209,9 +209,10 @@ END
       rm -rf "$folder"
     done
   done <<END
+foliage 30
+shake 30
 occupied 0
 exposure_step 30
-shake 30
 END
   echo
 }

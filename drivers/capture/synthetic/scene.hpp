@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drivers/capture/synthetic/actor.hpp"
+#include "drivers/capture/synthetic/foliage.hpp"
 #include "drivers/capture/synthetic/material.hpp"
 #include "drivers/capture/synthetic/shape.hpp"
 #include "pipeline/core/rect.hpp"
@@ -98,6 +99,7 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Shape> statics;  ///< at least two; the first is the floor, which hides nothing from the sun
   std::optional<Lamp> lamp;
+  std::optional<Foliage> foliage;
   std::function<Moment(double t_s)> moment;  ///< none: nothing changes but the clouds
   bool sways = false;                        ///< the mast; how says `moment`
   Vec3 horizon_colour;

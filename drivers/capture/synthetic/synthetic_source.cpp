@@ -105,12 +105,13 @@ Next SyntheticSource::next(FramePair& out) noexcept {
     const Moment moment = scene_.moment ? scene_.moment(t) : Moment{};
     LightLevel level = light_at(options_.seed, t);
     level.lamp = moment.lamp;
+    if (scene_.foliage) scene_.foliage->pose(t, foliage_);
     const std::span<const PosedActor> actors(posed_.data(), posed_count_);
     const auto render = [&](std::size_t i) {
       if (scene_.sways) {
         views_[i].turn(scene_.rig.camera(static_cast<int>(i), options_.width, options_.height, moment.sway));
       }
-      views_[i].cast_actors(actors);
+      views_[i].cast_actors(actors, foliage_);
       views_[i].expose(level, moment.exposure, sensors_[i], done_, pixels_[i].data());
     };
     render(0);

@@ -93,6 +93,7 @@ class SyntheticSource final : public FrameSource {
   std::int64_t act_ = -1;  ///< whose cast it is
   std::vector<synthetic::PosedActor> posed_;
   std::size_t posed_count_ = 0;
+  synthetic::PosedFoliage foliage_;
   GroundTruth truth_;
   std::vector<std::uint8_t> stamp_;
 };

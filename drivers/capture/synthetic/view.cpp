@@ -25,6 +25,7 @@ View::View(const Scene& scene, const PinholeCamera& camera)
   contact_.resize(pixels);
   row_span_.resize(static_cast<std::size_t>(camera.height));
   row_.resize(3 * static_cast<std::size_t>(camera.width));
+  if (scene.foliage) leaf_shadow_.resize(pixels);
   if (scene.sways) {
     turnable_.emplace(scene, camera);
     still_.resize(scene, camera);
@@ -48,7 +49,7 @@ void View::mark(const Rect& box) noexcept {
   }
 }
 
-void View::cast_actors(std::span<const PosedActor> actors) {
+void View::cast_actors(std::span<const PosedActor> actors, const PosedFoliage& foliage) {
   for (const Rect& box : dirty_) {
     for (int y = box.top; y < box.bottom(); ++y) {
       const std::size_t from = index(box.left, y);
@@ -56,11 +57,14 @@ void View::cast_actors(std::span<const PosedActor> actors) {
       std::copy_n(&still_.depth[kSamples * from], kSamples * count, &depth_[kSamples * from]);
       std::fill_n(&who_[kSamples * from], kSamples * count, std::uint16_t{0});
       std::fill_n(&shadow_[from], count, std::uint8_t{0});
+      if (!leaf_shadow_.empty()) std::fill_n(&leaf_shadow_[from], count, std::uint8_t{0});
       std::fill_n(&contact_[from], count, std::uint8_t{0});
     }
   }
   dirty_.clear();
   std::fill(row_span_.begin(), row_span_.end(), std::array<int, 2>{camera_.width, 0});
+
+  cast_leaves(foliage);
 
   part_count_ = 0;
   for (std::size_t a = 0; a < actors.size(); ++a) {
@@ -96,6 +100,39 @@ void View::cast_actors(std::span<const PosedActor> actors) {
   }
 }
 
+void View::cast_leaves(const PosedFoliage& foliage) {
+  leaves_ = foliage.leaves;
+  std::size_t first = 0;
+  for (const std::size_t end : foliage.clump_ends) {
+    Rect clump;
+    for (std::size_t i = first; i < end; ++i) {
+      const Rect box = intersect(screen_box(camera_, leaves_[i].shape), frame_);
+      if (box.empty()) continue;
+      clump = unite(clump, box);
+      const auto who = static_cast<std::uint16_t>(kFirstLeaf + i);
+      cast(camera_, leaves_[i].shape, box, kOffsets, [&](int x, int y, std::size_t s, double depth) {
+        const std::size_t at = kSamples * index(x, y) + s;
+        if (static_cast<float>(depth) >= depth_[at]) return;
+        depth_[at] = static_cast<float>(depth);
+        who_[at] = who;
+      });
+    }
+    if (!clump.empty()) {
+      dirty_.push_back(clump);
+      mark(clump);
+    }
+    first = end;
+  }
+  for (const Shape& ball : foliage.shades) {
+    // Only where the shadow meets the floor; smaller than that of what moves.
+    const double fall = std::max(ball.center.y, 0.0) / scene_.light.to_sun.y;
+    const Vec3 down = ball.center - scene_.light.to_sun * fall;
+    const Rect box =
+        screen_box(camera_, down, ball.bounding_radius / scene_.light.to_sun.y + scene_.light.sun_radius * fall);
+    shade_still(ball, intersect(box, frame_), leaf_shadow_);
+  }
+}
+
 /// Looks from every pixel that the shadow can reach towards four points of the sun.
 void View::cast_shadow(const Part& part) {
   const Shape& shape = part.shape;
@@ -113,9 +150,11 @@ void View::cast_shadow(const Part& part) {
   } else {
     sweep(shape.center, shape.bounding_radius);
   }
-  box = intersect(box, frame_);
-  if (box.empty()) return;
+  shade_still(shape, intersect(box, frame_), shadow_);
+}
 
+void View::shade_still(const Shape& shape, const Rect& box, std::vector<std::uint8_t>& bits) {
+  if (box.empty()) return;
   const Caster caster(shape);
   std::array<Vec3, kSamples> direction;
   for (std::size_t s = 0; s < kSamples; ++s) direction[s] = caster.direction(to_sun_[s]);
@@ -127,7 +166,7 @@ void View::cast_shadow(const Part& part) {
     int high = 0;
     for (int x = box.left; x < box.right(); ++x) {
       const std::size_t pixel = index(x, y);
-      if (shadow_[pixel] == kAll || still_.sun_light[3 * pixel + 1] <= 0.0F) continue;
+      if (bits[pixel] == kAll || still_.sun_light[3 * pixel + 1] <= 0.0F) continue;
       const Vec3 point = camera_.position + camera_.ray(x, y) * static_cast<double>(still_.center_depth[pixel]);
       const Vec3 to = shape.center - point;
       const double along = dot(to, sun);
@@ -135,9 +174,9 @@ void View::cast_shadow(const Part& part) {
       if (along < -reach || dot(to, to) - along * along > reach * reach) continue;
       const Vec3 origin = caster.origin(point);
       for (std::size_t s = 0; s < kSamples; ++s) {
-        if (caster.hit(origin, direction[s]) < kMiss) shadow_[pixel] |= static_cast<std::uint8_t>(1U << s);
+        if (caster.hit(origin, direction[s]) < kMiss) bits[pixel] |= static_cast<std::uint8_t>(1U << s);
       }
-      if (shadow_[pixel] != 0) {
+      if (bits[pixel] != 0) {
         low = std::min(low, x);
         high = std::max(high, x + 1);
       }
@@ -224,15 +263,34 @@ Vec3 View::shade(const Part& part, std::size_t sample, double u, double v, doubl
   return colour * light;
 }
 
+/// The side that the sun does not reach glows a little: leaves let light through.
+Vec3 View::shade(const PosedLeaf& leaf, std::size_t sample, double u, double v, double depth,
+                 const LightLevel& level) const noexcept {
+  const Vec3 point = camera_.position + camera_.ray(u, v) * depth;
+  const Vec3 local = leaf.shape.axes.to_local(point - leaf.shape.center);
+  const Vec3 flat = local_normal(leaf.shape, local);
+  const Vec3 normal = leaf.shape.axes.to_world(flat);
+  const Vec3 colour = flat.y > 0 ? leaf.upper : leaf.under;
+  const double facing = dot(normal, to_sun_[sample]);
+  const double sun = leaf.lit * level.sun * (facing > 0 ? facing : -0.42 * facing);
+  return colour * (skylight(scene_.light, normal) * (leaf.open * level.sky) + scene_.light.sun * sun);
+}
+
 /// Hidden part of the sun, smoothed with 1 2 1 in x and y.
-double View::shadow(int x, int y) const noexcept {
+double View::shadow(int x, int y, Shaders shaders) const noexcept {
   constexpr std::array<int, 16> kBitCount{0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4};
   int sum = 0;
   for (int dy = -1; dy <= 1; ++dy) {
     const int row = std::clamp(y + dy, 0, camera_.height - 1);
     for (int dx = -1; dx <= 1; ++dx) {
       const int column = std::clamp(x + dx, 0, camera_.width - 1);
-      sum += (2 - std::abs(dx)) * (2 - std::abs(dy)) * kBitCount[shadow_[index(column, row)]];
+      const std::size_t pixel = index(column, row);
+      unsigned bits = shadow_[pixel];
+      if (!leaf_shadow_.empty()) {
+        const unsigned leaves = leaf_shadow_[pixel];
+        bits = shaders == Shaders::kAll ? bits | leaves : (shaders == Shaders::kLeaves ? leaves : bits & ~leaves);
+      }
+      sum += (2 - std::abs(dx)) * (2 - std::abs(dy)) * kBitCount[bits];
     }
   }
   return static_cast<double>(sum) / (16.0 * kSamples);
@@ -253,7 +311,7 @@ void View::expose(const LightLevel& level, double exposure, const Sensor& sensor
     const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
     for (int x = first; x < last; ++x) {
       const std::size_t pixel = index(x, y);
-      const auto lit = static_cast<float>(level.sun * (1.0 - shadow(x, y)));
+      const auto lit = static_cast<float>(level.sun * (1.0 - shadow(x, y, Shaders::kAll)));
       const auto open = static_cast<float>(level.sky * (1.0 - contact_[pixel] / 255.0));
       const std::size_t out = 3 * static_cast<std::size_t>(x);
       for (std::size_t c = 0; c < 3; ++c) {
@@ -269,8 +327,11 @@ void View::expose(const LightLevel& level, double exposure, const Sensor& sensor
       for (std::size_t s = 0; s < kSamples; ++s) {
         if (who[s] == 0) continue;
         ++covered;
-        sum = sum + shade(parts_[who[s] - 1U], s, x + kOffsets[s].x, y + kOffsets[s].y,
-                          static_cast<double>(depth_[kSamples * pixel + s]), level);
+        const double u = x + kOffsets[s].x;
+        const double v = y + kOffsets[s].y;
+        const auto depth = static_cast<double>(depth_[kSamples * pixel + s]);
+        sum = sum + (who[s] >= kFirstLeaf ? shade(leaves_[who[s] - kFirstLeaf], s, u, v, depth, level)
+                                          : shade(parts_[who[s] - 1U], s, u, v, depth, level));
       }
       if (covered == 0) continue;
       const float still = static_cast<float>(static_cast<int>(kSamples) - covered) / kSamples;
@@ -290,10 +351,12 @@ View::Owner View::owner(int x, int y) const noexcept {
   };
   const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
   if (x < first || x >= last) return still();
+  constexpr int kNobody = -1;
+  constexpr int kLeaves = -2;
   std::array<int, kSamples> actor{};
   for (std::size_t s = 0; s < kSamples; ++s) {
     const std::uint16_t who = who_[kSamples * pixel + s];
-    actor[s] = who == 0 ? -1 : parts_[who - 1U].actor;
+    actor[s] = who == 0 ? kNobody : (who >= kFirstLeaf ? kLeaves : parts_[who - 1U].actor);
   }
   Owner best;
   int most = 0;
@@ -310,6 +373,7 @@ View::Owner View::owner(int x, int y) const noexcept {
       best = {actor[s], inverse / votes};
     }
   }
+  if (best.actor == kLeaves) return {-1, best.inverse_depth};
   return best.actor < 0 ? still() : best;
 }
 
@@ -329,7 +393,11 @@ double View::darkening(int x, int y) const noexcept {
     for (std::size_t c = 0; c < 3; ++c)
       lamp += kLuma[c] * static_cast<double>(lamp_ * still_.lamp_light[3 * pixel + c]);
   }
-  const double lost = (sky + lamp) * (contact_[pixel] / 255.0) + sun * shadow(x, y);
+  int leaves = 0;
+  for (std::size_t k = 0; k < kSamples; ++k) leaves += who_[kSamples * pixel + k] >= kFirstLeaf ? 1 : 0;
+  if (2 * leaves >= static_cast<int>(kSamples)) return 0.0;
+  const double lost = (sky + lamp) * (contact_[pixel] / 255.0) + sun * shadow(x, y, Shaders::kActors);
+  if (!leaf_shadow_.empty()) sun *= 1.0 - shadow(x, y, Shaders::kLeaves);
   const double all = sky + sun + lamp;
   return all > 0 ? lost / all : 0.0;
 }

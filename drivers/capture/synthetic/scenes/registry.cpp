@@ -1,6 +1,7 @@
 #include "drivers/capture/synthetic/scene.hpp"
 #include "drivers/capture/synthetic/scenes/eleven.hpp"
 #include "drivers/capture/synthetic/scenes/exposure_step.hpp"
+#include "drivers/capture/synthetic/scenes/foliage.hpp"
 #include "drivers/capture/synthetic/scenes/occupied.hpp"
 #include "drivers/capture/synthetic/scenes/shake.hpp"
 
@@ -11,6 +12,7 @@ const std::vector<SceneEntry>& scenes() {
       {"eleven", "a yard with eleven moving things: people, a dog, a trolley, balls, a drone...", &make_eleven},
       {"occupied", "the yard with six things that stand there in frame 1 and leave one by one", &make_occupied},
       {"exposure_step", "the yard while exposure jumps and a floodlight goes on and off", &make_exposure_step},
+      {"foliage", "the yard with trees, bushes and a flag in gusts of wind", &make_foliage},
       {"shake", "the yard seen from a mast that sways by up to 4 px", &make_shake},
   };
   return all;
