@@ -121,7 +121,7 @@ void remove_later_ones(const fs::path& out, std::uint64_t last) {
 }  // namespace
 
 void add_options(CLI::App& command, SynthArguments& arguments) {
-  command.add_option("scene", arguments.scene, "name of the scene, like eleven")->required();
+  command.add_option("scene", arguments.scene, "name of the scene: " + capture::synthetic::scene_names())->required();
   command.add_option("--out", arguments.out, "folder for left/ right/ masks/ disparity/ calibration.yml gt.csv")
       ->required();
   command.add_option("--seed", arguments.seed, "another seed, another drawing of the scene")->capture_default_str();

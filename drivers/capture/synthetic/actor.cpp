@@ -280,6 +280,7 @@ bool pose(const Actor& actor, double t_s, PosedActor& out) {
   out.shapes.clear();
   out.contacts.clear();
   out.id = actor.id;
+  out.undecided = t_s < actor.undecided_until_s;
   if (t_s < actor.path.start_s() || t_s > actor.path.end_s()) return false;
   const Place3 place = actor.path.at(t_s);
   switch (actor.kind) {

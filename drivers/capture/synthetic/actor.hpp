@@ -31,6 +31,8 @@ struct Actor {
   double spin = 0;                 ///< turn about the vertical [rad/s]
   double phase = 0;                ///< of gait or turn at the start [rad]
   double throw_height = 0;         ///< of a bouncing ball's first top [m]
+  /// Until then it has never moved since frame 1: nobody can tell it from what stands still [s].
+  double undecided_until_s = -1e9;
 
   /// Radius of the disc on the floor that it needs, for keeping out of each other's way [m].
   [[nodiscard]] double footprint() const noexcept;
@@ -41,6 +43,7 @@ struct Actor {
 /// An actor at one moment.
 struct PosedActor {
   std::uint32_t id = 0;
+  bool undecided = false;  ///< has not moved yet
   std::vector<Shape> shapes;
   std::vector<Shape> contacts;  ///< spheres that keep skylight from the floor beneath
   Vec3 center;                  ///< of a sphere around all shapes

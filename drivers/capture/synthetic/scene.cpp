@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/core/pinned_math.hpp"
+
 namespace stereotrack::capture::synthetic {
 namespace {
 
@@ -52,6 +54,25 @@ PinholeCamera Rig::camera(int index, int width, int height) const noexcept {
   camera.cy = 0.5 * (height - 1);
   camera.width = width;
   camera.height = height;
+  return camera;
+}
+
+PinholeCamera Rig::camera(int index, int width, int height, const Sway& sway) const noexcept {
+  PinholeCamera camera = this->camera(index, width, height);
+  const Axes rest = camera.axes;
+  // In camera axes (right, down, forward): first roll about z, then pitch about x, then yaw about y.
+  const double cr = pinned_cos(sway.roll), sr = pinned_sin(sway.roll);
+  const double cp = pinned_cos(sway.pitch), sp = pinned_sin(sway.pitch);
+  const double cy = pinned_cos(sway.yaw), sy = pinned_sin(sway.yaw);
+  const auto turned = [&](Vec3 v) {
+    v = {cr * v.x - sr * v.y, sr * v.x + cr * v.y, v.z};
+    v = {v.x, cp * v.y - sp * v.z, sp * v.y + cp * v.z};
+    v = {cy * v.x + sy * v.z, v.y, cy * v.z - sy * v.x};
+    return rest.to_world(v);
+  };
+  camera.axes = {turned({1, 0, 0}), turned({0, 1, 0}), turned({0, 0, 1})};
+  const double side = (index - 0.5) * baseline_m;
+  camera.position = Vec3{0.5 * baseline_m, height_m, 0} + camera.axes.x * side;
   return camera;
 }
 

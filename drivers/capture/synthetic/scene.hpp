@@ -1,12 +1,15 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "drivers/capture/synthetic/actor.hpp"
+#include "drivers/capture/synthetic/foliage.hpp"
 #include "drivers/capture/synthetic/material.hpp"
 #include "drivers/capture/synthetic/shape.hpp"
 #include "pipeline/core/rect.hpp"
@@ -32,6 +35,13 @@ struct PinholeCamera {
   [[nodiscard]] Vec3 to_camera(Vec3 world) const noexcept { return axes.to_local(world - position); }
 };
 
+/// How far a rig is turned from where it looks at rest, about its own axes; small [rad].
+struct Sway {
+  double yaw = 0;    ///< to the right: the picture goes to the left
+  double pitch = 0;  ///< upwards: the picture goes down
+  double roll = 0;   ///< clockwise: the picture turns counter-clockwise
+};
+
 /// Two cameras side by side on a mast, looking slightly down: rectified by construction.
 struct Rig {
   double height_m = 3.0;
@@ -41,6 +51,8 @@ struct Rig {
   double baseline_m = 0.25;
 
   [[nodiscard]] PinholeCamera camera(int index, int width, int height) const noexcept;  ///< 0 left, 1 right
+  /// The same while the mast sways: the rig turns as one about the middle between the cameras.
+  [[nodiscard]] PinholeCamera camera(int index, int width, int height, const Sway& sway) const noexcept;
   [[nodiscard]] StereoCalibration calibration(int width, int height) const;
 };
 
@@ -53,6 +65,31 @@ struct Light {
   Vec3 bounce;                ///< on a surface that faces down
 };
 
+/// A floodlight that hangs over the yard. It is wide: nobody throws a shadow in it but right beneath himself.
+///     light on a surface = light facing cone / distance^2,   cone: 1 within cos_full of straight down, 0 from cos_none
+struct Lamp {
+  Vec3 position;
+  Vec3 light;  ///< at 1 m
+  double cos_full = 0.9;
+  double cos_none = 0.7;
+
+  [[nodiscard]] Vec3 on(Vec3 point, Vec3 normal) const noexcept {
+    const Vec3 to = position - point;
+    const double d2 = dot(to, to);
+    const double d = std::sqrt(d2);
+    const double facing = dot(to, normal);
+    if (facing <= 0 || d2 <= 0) return {};
+    return light * (facing / (d * d2) * smoothstep(cos_none, cos_full, to.y / d));
+  }
+};
+
+/// What changes for all of both pictures from one moment to the next.
+struct Moment {
+  double exposure = 1;  ///< factor on the gain of both cameras
+  double lamp = 0;      ///< how bright the scene's lamp burns
+  Sway sway;            ///< where the scene sways
+};
+
 /// Everything that can be pictured, and who comes by.
 struct Scene {
   std::string name;
@@ -61,6 +98,10 @@ struct Scene {
   Light light;
   std::vector<Material> materials;
   std::vector<Shape> statics;  ///< at least two; the first is the floor, which hides nothing from the sun
+  std::optional<Lamp> lamp;
+  std::optional<Foliage> foliage;
+  std::function<Moment(double t_s)> moment;  ///< none: nothing changes but the clouds
+  bool sways = false;                        ///< the mast; how says `moment`
   Vec3 horizon_colour;
   Vec3 zenith_colour;
   double act_s = 0;      ///< every so many seconds a new cast comes on, the old one gone
@@ -76,6 +117,7 @@ struct SceneEntry {
   Scene (*make)(std::uint64_t seed);
 };
 [[nodiscard]] const std::vector<SceneEntry>& scenes();
+[[nodiscard]] std::string scene_names();  ///< "eleven, occupied..."
 
 /// Pixels that the picture of a shape (a sphere) can touch, not clipped. Empty if all of it is nearer
 /// than 0.2 m or behind the camera.

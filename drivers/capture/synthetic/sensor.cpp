@@ -40,15 +40,15 @@ Sensor::Sensor(const Config& config) : config_(config) {
   }
 }
 
-void Sensor::expose(const float* light, int y, std::uint64_t frame, std::uint8_t* bgr) const noexcept {
+void Sensor::expose(const float* light, int y, std::uint64_t frame, std::uint8_t* bgr, double exposure) const noexcept {
   const auto& normal = normal_quantiles();
   const double half_diagonal2 = 0.25 * (static_cast<double>(config_.width) * config_.width +
                                         static_cast<double>(config_.height) * config_.height);
   const double dy = y - 0.5 * (config_.height - 1);
   const auto row_fall_off = static_cast<float>(1.0 - config_.vignetting * dy * dy / half_diagonal2);
-  const float gain[3] = {static_cast<float>(config_.gain.x * kCurveSize),
-                         static_cast<float>(config_.gain.y * kCurveSize),
-                         static_cast<float>(config_.gain.z * kCurveSize)};
+  const float gain[3] = {static_cast<float>(config_.gain.x * exposure * kCurveSize),
+                         static_cast<float>(config_.gain.y * exposure * kCurveSize),
+                         static_cast<float>(config_.gain.z * exposure * kCurveSize)};
   const std::uint64_t key = mix_bits(mix_bits(config_.seed * 2 + static_cast<std::uint64_t>(config_.camera)) + frame);
   std::uint64_t counter = key + static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(config_.width);
   constexpr std::uint64_t kMask = (1U << kNormalBits) - 1;

@@ -10,7 +10,7 @@ namespace stereotrack::capture::synthetic {
 
 /// From light to grey levels, as a camera does it: vignetting, exposure and colour balance, a curve,
 /// noise, 8 bits.
-///     level = 255 (gain v light)^(29/64),   v = 1 - vignetting (r / half diagonal)^2
+///     level = 255 (exposure gain v light)^(29/64),   v = 1 - vignetting (r / half diagonal)^2
 ///     noise = sigma_luma(level) n0 + 1.9 n_channel,   sigma_luma^2 = 2.9^2 + 0.022 level
 /// Noise n: normal, from (seed, camera, frame, pixel) alone. Its standard deviation is 3.5 to 4.1 levels in a
 /// channel and 3.2 to 3.9 in the luma. The curve is near sRGB's; its exponent is a product of square roots.
@@ -28,7 +28,8 @@ class Sensor {
   explicit Sensor(const Config& config);
 
   /// One row: `light` holds width x (red, green, blue), `bgr` receives width x (blue, green, red).
-  void expose(const float* light, int y, std::uint64_t frame, std::uint8_t* bgr) const noexcept;
+  /// `exposure`: a factor on the gain.
+  void expose(const float* light, int y, std::uint64_t frame, std::uint8_t* bgr, double exposure = 1.0) const noexcept;
 
  private:
   static constexpr int kCurveSize = 1 << 14;

@@ -16,12 +16,10 @@ namespace {
 using namespace synthetic;  // NOLINT(google-build-using-namespace): this file is the engine's outer wall
 
 const SceneEntry& find_scene(const std::string& name) {
-  std::string known;
   for (const SceneEntry& entry : scenes()) {
     if (entry.name == name) return entry;
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
   }
-  throw SceneError("synthetic:" + name + ": no such scene; there is " + known);
+  throw SceneError("synthetic:" + name + ": no such scene; there is " + scene_names());
 }
 
 void check(const std::string& name, const SyntheticOptions& o) {
@@ -104,11 +102,17 @@ Next SyntheticSource::next(FramePair& out) noexcept {
     for (const Actor& actor : cast_) {
       if (pose(actor, t, posed_[posed_count_])) ++posed_count_;
     }
-    const LightLevel level = light_at(options_.seed, t);
+    const Moment moment = scene_.moment ? scene_.moment(t) : Moment{};
+    LightLevel level = light_at(options_.seed, t);
+    level.lamp = moment.lamp;
+    if (scene_.foliage) scene_.foliage->pose(t, foliage_);
     const std::span<const PosedActor> actors(posed_.data(), posed_count_);
     const auto render = [&](std::size_t i) {
-      views_[i].cast_actors(actors);
-      views_[i].expose(level, sensors_[i], done_, pixels_[i].data());
+      if (scene_.sways) {
+        views_[i].turn(scene_.rig.camera(static_cast<int>(i), options_.width, options_.height, moment.sway));
+      }
+      views_[i].cast_actors(actors, foliage_);
+      views_[i].expose(level, moment.exposure, sensors_[i], done_, pixels_[i].data());
     };
     render(0);
     render(1);
@@ -157,8 +161,9 @@ void SyntheticSource::work_out_truth() {
         if (view.darkening(x, y) > 0.16) truth_.labels[i] = GroundTruth::kShadow;
         continue;
       }
-      truth_.labels[i] = GroundTruth::kMoving;
-      Sum& sum = sums[static_cast<std::size_t>(owner.actor)];
+      const auto actor = static_cast<std::size_t>(owner.actor);
+      truth_.labels[i] = posed_[actor].undecided ? GroundTruth::kUnknown : GroundTruth::kMoving;
+      Sum& sum = sums[actor];
       const double z = 1.0 / owner.inverse_depth;
       sum.box = unite(sum.box, {x, y, 1, 1});
       sum.x += (x - camera.cx) / camera.f * z;
@@ -201,7 +206,7 @@ void SyntheticSource::work_out_truth() {
     const Sum& s = sums[a];
     if (s.count == 0) continue;
     truth_.objects.push_back({posed_[a].id, s.box, s.x / s.count, s.y / s.count, s.z / s.count, s.count, s.hidden,
-                              std::max(s.whole, s.count)});
+                              std::max(s.whole, s.count), posed_[a].undecided});
   }
   std::sort(truth_.objects.begin(), truth_.objects.end(),
             [](const TrueObject& a, const TrueObject& b) { return a.id < b.id; });

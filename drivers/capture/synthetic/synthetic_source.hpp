@@ -38,14 +38,19 @@ struct TrueObject {
   int visible_px = 0;          ///< pixels of which the object fills the most
   int hidden_px = 0;           ///< pixels it would fill if the other moving objects were not there, but does not
   int whole_px = 0;            ///< pixels of all of it, were nothing in front and the picture endless
-  [[nodiscard]] bool scored() const noexcept { return 4 * visible_px >= whole_px; }
+  bool undecided = false;      ///< has stood since frame 1 and never moved
+  [[nodiscard]] bool scored() const noexcept { return !undecided && 4 * visible_px >= whole_px; }
 };
 
+/// Labels are those of changedetection.net. 85, outside of the region of interest, does not occur: all of a
+/// picture is known.
 struct GroundTruth {
   static constexpr std::uint8_t kStill = 0;
-  static constexpr std::uint8_t kShadow =
-      50;  ///< an object's shadow on what stands still: 16 % less light, 8 % in grey
-  static constexpr std::uint8_t kMoving = 255;
+  /// An object's shadow on what stands still: 16 % less light, 8 % in grey.
+  static constexpr std::uint8_t kShadow = 50;
+  /// An object that has stood since frame 1 and never moved: not scored.
+  static constexpr std::uint8_t kUnknown = 170;
+  static constexpr std::uint8_t kMoving = 255;  ///< an object that moves, or has moved and stands for a while
 
   std::vector<TrueObject> objects;       ///< with a visible pixel, by id
   std::vector<std::uint8_t> labels;      ///< width x height, the constants above (those of changedetection.net)
@@ -88,6 +93,7 @@ class SyntheticSource final : public FrameSource {
   std::int64_t act_ = -1;  ///< whose cast it is
   std::vector<synthetic::PosedActor> posed_;
   std::size_t posed_count_ = 0;
+  synthetic::PosedFoliage foliage_;
   GroundTruth truth_;
   std::vector<std::uint8_t> stamp_;
 };

@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "drivers/capture/synthetic/scene.hpp"
 #include "drivers/capture/synthetic/sensor.hpp"
+#include "drivers/capture/synthetic/still_picture.hpp"
 
 namespace stereotrack::capture::synthetic {
 
@@ -14,26 +16,26 @@ namespace stereotrack::capture::synthetic {
 struct LightLevel {
   double sun = 1;
   double sky = 1;
+  double lamp = 0;
 };
 
 /// A scene ray-cast into one camera.
 ///
-/// What stands still is cast once, with 13 rays a pixel, and kept in two parts, sunlight and skylight, so
-/// that a shadow or a cloud only weighs them. A frame costs rays where objects and their shadows can be:
+/// What stands still is cast once (see StillPicture). A frame costs rays where objects and their shadows can be:
 /// four a pixel for objects (shape, texture, sun, shadows of everything else), four towards the sun for
 /// shadows on what stands still.
 ///
 /// Memory: about 90 bytes a pixel. One thread an instance.
 class View {
  public:
-  static constexpr std::size_t kSamples = 4;
-
   View(const Scene& scene, const PinholeCamera& camera);
 
-  /// Casts the actors into this view.
-  void cast_actors(std::span<const PosedActor> actors);
+  /// From here on the picture is that of this camera; only where the scene sways.
+  void turn(const PinholeCamera& camera);
+  /// Casts the actors into this view, and the leaves of a scene that has foliage.
+  void cast_actors(std::span<const PosedActor> actors, const PosedFoliage& foliage = {});
   /// The picture of the last cast_actors(): width x height, blue green red, rows without gaps.
-  void expose(const LightLevel& level, const Sensor& sensor, std::uint64_t frame, std::uint8_t* bgr);
+  void expose(const LightLevel& level, double exposure, const Sensor& sensor, std::uint64_t frame, std::uint8_t* bgr);
 
   [[nodiscard]] const PinholeCamera& camera() const noexcept { return camera_; }
 
@@ -44,6 +46,7 @@ class View {
   };
   [[nodiscard]] Owner owner(int x, int y) const noexcept;
   /// How much of its light a pixel of what stands still loses to shadows of actors, 0..1.
+  /// Nothing where leaves are.
   [[nodiscard]] double darkening(int x, int y) const noexcept;
 
  private:
@@ -54,14 +57,22 @@ class View {
     std::vector<std::uint16_t> static_shaders;  ///< the same of what stands still
   };
 
-  void cast_statics();
-  void cast_statics_rows(int first, int last, std::span<const Rect> boxes);
+  /// What hides the sun: actors where no leaf does it already.
+  enum class Shaders { kAll, kActors, kLeaves };
+
+  static constexpr std::uint16_t kFirstLeaf = 0x4000;
+  static_assert(kFirstLeaf + Foliage::kMostLeaves < 0x10000);
+
+  void cast_leaves(const PosedFoliage& foliage);
   void cast_shadow(const Part& part);
+  void shade_still(const Shape& shape, const Rect& box, std::vector<std::uint8_t>& bits);
   void cast_contact(const Shape& sphere);
   void find_shaders(std::size_t first, std::size_t count);
   void mark(const Rect& box) noexcept;
-  [[nodiscard]] double shadow(int x, int y) const noexcept;
+  [[nodiscard]] double shadow(int x, int y, Shaders shaders) const noexcept;
   [[nodiscard]] Vec3 shade(const Part& part, std::size_t sample, double u, double v, double depth,
+                           const LightLevel& level) const noexcept;
+  [[nodiscard]] Vec3 shade(const PosedLeaf& leaf, std::size_t sample, double u, double v, double depth,
                            const LightLevel& level) const noexcept;
   [[nodiscard]] std::size_t index(int x, int y) const noexcept {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width) + static_cast<std::size_t>(x);
@@ -72,23 +83,22 @@ class View {
   Rect frame_;
   std::array<Vec3, kSamples> to_sun_;  ///< directions into the sun's disc, unit
 
-  // What stands still, per pixel.
-  std::vector<float> sky_light_;     ///< 3: reflected skylight
-  std::vector<float> sun_light_;     ///< 3: reflected sunlight
-  std::vector<float> normal_;        ///< 3: world
-  std::vector<float> center_depth_;  ///< at the pixel's centre [m]; kSkyDepth where nothing is
-  std::vector<float> still_depth_;   ///< kSamples
+  StillPicture still_;                     ///< as camera_ sees it now
+  std::optional<TurnableStill> turnable_;  ///< where the scene sways
 
   // This frame, per pixel.
   std::vector<float> depth_;           ///< kSamples
-  std::vector<std::uint16_t> who_;     ///< kSamples: 0 = still, else index into parts_ + 1
+  std::vector<std::uint16_t> who_;     ///< kSamples: 0 = still, from kFirstLeaf on a leaf, else index into parts_ + 1
   std::vector<std::uint8_t> shadow_;   ///< bit s: the sun's sample s is hidden
   std::vector<std::uint8_t> contact_;  ///< skylight taken away, of 255
+  std::vector<std::uint8_t> leaf_shadow_;  ///< the same as shadow_ of leaves; empty without foliage
+  std::vector<PosedLeaf> leaves_;
   std::vector<Part> parts_;
   std::size_t part_count_ = 0;
   std::vector<Rect> dirty_;                   ///< what this frame's actors may have touched
   std::vector<std::array<int, 2>> row_span_;  ///< the same, by rows: first and one past the last column
   std::vector<float> row_;
+  float lamp_ = 0;  ///< how bright the lamp burns
 };
 
 }  // namespace stereotrack::capture::synthetic

@@ -8,53 +8,21 @@
 #include <vector>
 
 #include "drivers/capture/synthetic/synthetic_source.hpp"
+#include "tests/unit/synthetic/scene_support.hpp"
 
 namespace stereotrack::capture {
 namespace {
 
-SyntheticOptions small(std::uint64_t seed = 1) {
-  SyntheticOptions o;
-  o.seed = seed;
-  o.width = 160;
-  o.height = 120;
-  o.truth = true;
-  return o;
-}
-
-std::uint64_t fnv1a(const Picture& p, std::uint64_t hash) {
-  for (int y = 0; y < p.height; ++y) {
-    for (int i = 0; i < p.width * bytes_per_pixel(p.format); ++i) hash = (hash ^ p.row(y)[i]) * 0x100000001b3ULL;
-  }
-  return hash;
-}
-
-std::uint64_t hash_of(const FramePair& pair) { return fnv1a(pair.right, fnv1a(pair.left, 0xcbf29ce484222325ULL)); }
-
-/// The pair with this ordinal, nothing before it drawn.
-std::uint64_t hash_at(const SyntheticOptions& options, std::uint64_t ordinal) {
-  const auto source = open_synthetic("eleven", options);
-  source->skip_to(ordinal - 1);
-  FramePair pair;
-  EXPECT_EQ(source->next(pair), Next::kPair);
-  EXPECT_EQ(pair.ordinal, ordinal);
-  return hash_of(pair);
-}
-
-double luma(const Picture& p, int x, int y) {
-  const std::uint8_t* v = p.row(y) + 3 * x;
-  return 0.114 * v[0] + 0.587 * v[1] + 0.299 * v[2];
-}
-
 // These bytes are the same on every machine; they change only when the drawing does.
 TEST(SyntheticEleven, BytesAreThoseOfEveryOtherMachine) {
-  EXPECT_EQ(hash_at(small(), 1), 0xfe0392f9d7c40831ULL);
-  EXPECT_EQ(hash_at(small(), 150), 0xe632de1d154b3d4ULL);
-  EXPECT_EQ(hash_at(small(), 400), 0xe49c4536bd86e29cULL);
+  EXPECT_EQ(hash_at("eleven", small(), 1), 0xfe0392f9d7c40831ULL);
+  EXPECT_EQ(hash_at("eleven", small(), 150), 0xe632de1d154b3d4ULL);
+  EXPECT_EQ(hash_at("eleven", small(), 400), 0xe49c4536bd86e29cULL);
 }
 
 TEST(SyntheticEleven, SkippingAndTruthChangeNoByte) {
   SyntheticOptions options = small();
-  const std::uint64_t skipped = hash_at(options, 12);
+  const std::uint64_t skipped = hash_at("eleven", options, 12);
   options.truth = false;
   const auto source = open_synthetic("eleven", options);
   FramePair pair;
@@ -64,7 +32,7 @@ TEST(SyntheticEleven, SkippingAndTruthChangeNoByte) {
 
 TEST(SyntheticEleven, SeedsDrawDifferentScenes) {
   std::set<std::uint64_t> hashes;
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) hashes.insert(hash_at(small(seed), 200));
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) hashes.insert(hash_at("eleven", small(seed), 200));
   EXPECT_EQ(hashes.size(), 3U);
 }
 
