@@ -19,13 +19,17 @@ class Bounds {
     top_ = std::min(top_, v);
     bottom_ = std::max(bottom_, v);
   }
-  /// A sphere: no point of it is seen further out than its surrounding cube's near and far face show.
   void add_sphere(const PinholeCamera& camera, Vec3 center, double radius) noexcept {
+    add_within(camera, center, {radius, radius, radius});
+  }
+  /// A body within center +- half, along the camera's axes: no point of it is seen further out than the near and far
+  /// face of that box show.
+  void add_within(const PinholeCamera& camera, Vec3 center, Vec3 half) noexcept {
     const Vec3 p = camera.to_camera(center);
-    if (p.z + radius < kNearest_m) return;
-    for (const double z : {std::max(p.z - radius, kNearest_m), p.z + radius}) {
-      add(camera.f * (p.x - radius) / z + camera.cx, camera.f * (p.y - radius) / z + camera.cy);
-      add(camera.f * (p.x + radius) / z + camera.cx, camera.f * (p.y + radius) / z + camera.cy);
+    if (p.z + half.z < kNearest_m) return;
+    for (const double z : {std::max(p.z - half.z, kNearest_m), p.z + half.z}) {
+      add(camera.f * (p.x - half.x) / z + camera.cx, camera.f * (p.y - half.y) / z + camera.cy);
+      add(camera.f * (p.x + half.x) / z + camera.cx, camera.f * (p.y + half.y) / z + camera.cy);
     }
   }
   [[nodiscard]] Rect rect() const noexcept {
@@ -103,7 +107,12 @@ Rect screen_box(const PinholeCamera& camera, const Shape& shape) noexcept {
     bounds.add_sphere(camera, shape.center + shape.axes.y * shape.half.y, shape.half.x);
     return bounds.rect();
   }
-  if (shape.kind == ShapeKind::kEllipsoid) return screen_box(camera, shape.center, shape.bounding_radius);
+  if (shape.kind == ShapeKind::kEllipsoid) {
+    // As far as it reaches along a direction d: |(half.x x.d, half.y y.d, half.z z.d)|.
+    const auto reach = [&](Vec3 d) { return length(shape.axes.to_local(d) * shape.half); };
+    bounds.add_within(camera, shape.center, {reach(camera.axes.x), reach(camera.axes.y), reach(camera.axes.z)});
+    return bounds.rect();
+  }
   int in_front = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 local{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,

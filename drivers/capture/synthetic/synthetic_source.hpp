@@ -58,8 +58,8 @@ struct GroundTruth {
 };
 
 /// `synthetic:NAME`: a scene ray-cast into two cameras. Pictures are functions of (name, seed, size, fps, ordinal)
-/// alone, the same bits on every machine. At 640 x 480: 1 to 3 s to open (two
-/// threads), 20 to 80 ms a pair.
+/// alone, the same bits on every machine. At 640 x 480: 2 to 4 s to open (two threads), 20 to 80 ms a pair, 100 ms
+/// where the mast sways or leaves wave.
 class SyntheticSource final : public FrameSource {
  public:
   /// Throws SceneError.
