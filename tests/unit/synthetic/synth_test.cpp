@@ -77,6 +77,25 @@ TEST_F(Synth, WritesPicturesTruthAndCalibration) {
                   "^1,1,[0-9]+,[0-9]+,[0-9]+,[0-9]+,[01],-?[0-9]+\\.[0-9]{5},-?[0-9]+\\.[0-9]{5},[0-9]+\\.[0-9]{5}\n"));
 }
 
+TEST_F(Synth, WhatHasNeverMovedIsUnknownInTheMaskAndNotScored) {
+  arguments_.scene = "synthetic:occupied";
+  arguments_.frames = 1;
+  std::ostringstream messages;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  const cv::Mat mask = cv::imread((arguments_.out / "masks" / "000001.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(mask.type(), CV_8UC1);
+  EXPECT_GT(cv::countNonZero(mask == 170), 100);
+  EXPECT_EQ(cv::countNonZero(mask == 255), 0);
+  EXPECT_EQ(cv::countNonZero((mask != 0) & (mask != 50) & (mask != 170)), 0);
+  // frame,id,left,top,width,height,confidence,...
+  std::istringstream rows(content(arguments_.out / "gt.csv"));
+  int count = 0;
+  for (std::string row; std::getline(rows, row); ++count) {
+    EXPECT_THAT(row, testing::MatchesRegex("1,[1-6],[0-9]+,[0-9]+,[0-9]+,[0-9]+,0,.*"));
+  }
+  EXPECT_EQ(count, 6);
+}
+
 TEST_F(Synth, SameArgumentsGiveTheSameBytes) {
   std::ostringstream messages;
   EXPECT_EQ(run_synth(arguments_, messages), 0);
