@@ -59,9 +59,7 @@ Result<LevelSet::Outcome> LevelSet::run(ImageView<const std::uint8_t> feature, I
     outcome.converged = true;
     return outcome;
   }
-  const int margin = config_.margin_px;
-  domain_ = intersect({start.left - margin, start.top - margin, start.width + 2 * margin, start.height + 2 * margin},
-                      picture);
+  domain_ = intersect(grown(start, config_.margin_px), picture);
   load(feature, labels, label);
   const std::int64_t data_start = in_.energy() + out_.energy();
   while (!outcome.converged && outcome.iterations < config_.max_iterations) {

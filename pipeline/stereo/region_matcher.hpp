@@ -64,6 +64,8 @@ class RegionMatcher {
     double sigma_floor_px = 0.2;     ///< 0.01..10 [px]
   };
 
+  [[nodiscard]] const Config& config() const noexcept { return config_; }
+
   [[nodiscard]] static Result<RegionMatcher> create(const Config& config, Arena& arena) noexcept;
 
   template <class Label>

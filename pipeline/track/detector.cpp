@@ -322,10 +322,8 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
     if (!target.confirmed) continue;
     const int slack =
         static_cast<int>(std::min(target.image_sd, 0.25 * std::max(target.box.width, target.box.height)) + 1.5);
-    const Rect reach{target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack,
-                     target.box.height + 2 * slack};
-    const double inside =
-        static_cast<double>(intersect(reach, candidate.box).area()) / static_cast<double>(candidate.box.area());
+    const double inside = static_cast<double>(intersect(grown(target.box, slack), candidate.box).area()) /
+                          static_cast<double>(candidate.box.area());
     if (inside <= 0.5) continue;
     if (!resembles(target, candidate)) continue;
     const double likeness = target.appearance == nullptr ? 1.0 : target.appearance->explains(candidate.appearance);
