@@ -262,11 +262,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   learn_background();
   ended(Stage::kBackground);
 
-  for (int y = 0; y < setup_.height; ++y) {
-    const std::uint16_t* label = blobs_.labels.row(y);
-    std::uint8_t* mask = left_.mask.row(y);
-    for (int x = 0; x < setup_.width; ++x) mask[x] = label[x] != 0 ? 255 : 0;
-  }
+  mask_of_labels(blobs_.labels, left_.mask);
   FrameResult result;
   result.ordinal = pair.ordinal;
   result.capture_time = pair.capture_time;
@@ -555,11 +551,7 @@ void Pipeline::reject_background() noexcept {
 }
 
 void Pipeline::remove_shadows() noexcept {
-  for (int y = 0; y < setup_.height; ++y) {
-    const std::uint16_t* label = blobs_.labels.row(y);
-    std::uint8_t* mask = left_.mask.row(y);
-    for (int x = 0; x < setup_.width; ++x) mask[x] = label[x] != 0 ? 255 : 0;
-  }
+  mask_of_labels(blobs_.labels, left_.mask);
   if (config_.shadow.method == ShadowMethod::kOff) return;
   if (config_.shadow.method == ShadowMethod::kChroma) {
     if (!setup_.colour) return;
