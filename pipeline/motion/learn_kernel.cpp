@@ -98,12 +98,21 @@ Word divide(Word n, const Divisor& by) {
   return hn::ShiftRightSame(hn::Add(t, hn::ShiftRight<1>(hn::Sub(n, t))), by.shift);
 }
 
+/// Each lane's own divisor.
+struct Divisors {
+  explicit Divisors(Word d) : even(even_reciprocal(d)), odd(odd_reciprocal(d)) {}
+  Float even;
+  Float odd;
+};
+Word divide(Word n, const Divisors& by) { return divide(n, by.even, by.odd); }
+
 /// From one value to another: one of the ways is 0, the other is their distance.
 struct Apart {
   Apart(Word from, Word to) : up(hn::SaturatedSub(to, from)), down(hn::SaturatedSub(from, to)) {}
   [[nodiscard]] Word distance() const { return hn::Or(up, down); }
   /// As step_towards(); the step is no longer than the way.
-  [[nodiscard]] Word step_from(Word from, const Divisor& by) const {
+  template <class By>
+  [[nodiscard]] Word step_from(Word from, const By& by) const {
     const Word step = divide(distance(), by);
     return hn::Sub(hn::Add(from, hn::Min(step, up)), hn::Min(step, down));
   }
@@ -116,7 +125,25 @@ Word now_of(const LearnRow::Channel& channel, int x) {
   return hn::ShiftLeft<8>(hn::PromoteTo(kWords, hn::LoadU(d8, channel.now + x)));
 }
 
-// Vectors in which not all pixels are background, or not of one age: each kind is worked out for all lanes, and each
+// Vectors in which all pixels are background.
+template <class By>
+void learn_calm(const LearnRow& row, const LearnRates& rates, int x, const By& by_rate, const By& by_slower) {
+  for (int c = 0; c < row.count; ++c) {
+    const LearnRow::Channel& channel = row.channels[c];
+    const Word mean = hn::LoadU(kWords, channel.mean + x);
+    const Word deviation = hn::LoadU(kWords, channel.deviation + x);
+    const Apart from_mean(mean, now_of(channel, x));
+    const Apart from_deviation(deviation, from_mean.distance());
+    hn::StoreU(from_mean.step_from(mean, by_rate), kWords, channel.mean + x);
+    hn::StoreU(from_deviation.step_from(deviation, by_slower), kWords, channel.deviation + x);
+  }
+  const Word one = word(1);
+  const Word age = hn::Add(hn::LoadU(kWords, row.age + x), one);
+  hn::StoreU(hn::Min(age, word(rates.absorb)), kWords, row.age + x);
+  hn::StoreU(hn::SaturatedSub(hn::LoadU(kWords, row.candidate_age + x), one), kWords, row.candidate_age + x);
+}
+
+// Vectors in which not all pixels are background: each kind is worked out for all lanes, and each
 // takes its own. rate: of background pixels.
 int learn_mixed(const LearnRow& row, const LearnRates& rates, int x, Word mask, Word rate) {
   const Word zero = hn::Zero(kWords);
@@ -178,7 +205,6 @@ int learn(const LearnRow& row, const LearnRates& rates, int width) {
   const Word zero = hn::Zero(kWords);
   const Word one = word(1);
   const Word window = word(rates.window);
-  const Word absorb = word(rates.absorb);
   Word rate = window;
   Divisor by_rate(rates.window);
   Divisor by_slower(rates.window + kPriorFrames);
@@ -188,30 +214,22 @@ int learn(const LearnRow& row, const LearnRates& rates, int width) {
     const Word mask = hn::PromoteTo(kWords, hn::LoadU(d8, row.mask + x));
     const Word age = hn::LoadU(kWords, row.age + x);
     const Word rate_here = hn::Min(hn::Add(age, one), window);
-    const auto calm = hn::AndNot(hn::Eq(age, zero), hn::Eq(mask, zero));
-    // Neighbours are mostly of one age, above all after a while: then nothing is divided by anew.
-    if (!hn::AllTrue(kWords, hn::And(calm, hn::Eq(rate, rate_here)))) {
+    if (!hn::AllTrue(kWords, hn::AndNot(hn::Eq(age, zero), hn::Eq(mask, zero)))) {
+      changed += learn_mixed(row, rates, x, mask, rate_here);
+      continue;
+    }
+    // Neighbours are mostly of one age, above all after a while.
+    if (!hn::AllTrue(kWords, hn::Eq(rate, rate_here))) {
       const int first = hn::GetLane(rate_here);
-      if (!hn::AllTrue(kWords, hn::And(calm, hn::Eq(word(first), rate_here)))) {
-        changed += learn_mixed(row, rates, x, mask, rate_here);
+      if (!hn::AllTrue(kWords, hn::Eq(word(first), rate_here))) {
+        learn_calm(row, rates, x, Divisors(rate_here), Divisors(hn::Add(rate_here, word(kPriorFrames))));
         continue;
       }
       rate = rate_here;
       by_rate = Divisor(first);
       by_slower = Divisor(first + kPriorFrames);
     }
-    for (int c = 0; c < row.count; ++c) {
-      const LearnRow::Channel& channel = row.channels[c];
-      const Word now = now_of(channel, x);
-      const Word mean = hn::LoadU(kWords, channel.mean + x);
-      const Word deviation = hn::LoadU(kWords, channel.deviation + x);
-      const Apart from_mean(mean, now);
-      const Apart from_deviation(deviation, from_mean.distance());
-      hn::StoreU(from_mean.step_from(mean, by_rate), kWords, channel.mean + x);
-      hn::StoreU(from_deviation.step_from(deviation, by_slower), kWords, channel.deviation + x);
-    }
-    hn::StoreU(hn::Min(hn::Add(age, one), absorb), kWords, row.age + x);
-    hn::StoreU(hn::SaturatedSub(hn::LoadU(kWords, row.candidate_age + x), one), kWords, row.candidate_age + x);
+    learn_calm(row, rates, x, by_rate, by_slower);
   }
   LearnRow rest = row;
   for (int c = 0; c < row.count; ++c) {
