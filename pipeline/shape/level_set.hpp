@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -102,6 +103,7 @@ class LevelSet {
   // The domain with a frame around it, as wide as pairs reach, rows stride_ apart.
   std::span<std::int8_t> side_;     // 1 inside, -1 outside, 0 not in the domain
   std::span<std::uint8_t> around_;  // sum of side_ over the disc of pairs, its middle included, from kNoSum up
+  std::array<std::span<std::int8_t>, 3> row_sums_;  // of a row of side_, over 3, 5 and 7 pixels
   std::span<std::uint8_t> feature_;
   std::span<std::uint8_t> queued_;
   std::span<std::int32_t> band_;
