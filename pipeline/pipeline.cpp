@@ -214,15 +214,15 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
         !keep(foreground_right_, ForegroundMask::create(config_.foreground, width, height, arena), outcome)) {
       return outcome;
     }
-    left_.background_canvas = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
-    right_.background_canvas = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
-    right_moving_ = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
+    left_.background_canvas = LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena);
+    right_.background_canvas = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena);
+    right_moving_ = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kNearest, arena);
     canvas_background_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
     if (!canvas_background_.empty()) fill(canvas_background_, {0, 0, canvas.width_left, canvas.height}, kNoDisparity);
     old_disparity_ = arena.image<std::uint16_t>(width, height);
   }
-  left_.canvas = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
-  right_.canvas = arena.image<std::uint8_t>(canvas.width_right, canvas.height);
+  left_.canvas = LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena);
+  right_.canvas = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena);
   wanted_ = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
   canvas_labels_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
   canvas_disparity_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
@@ -269,11 +269,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   learn_background();
   ended(Stage::kBackground);
 
-  for (int y = 0; y < setup_.height; ++y) {
-    const std::uint16_t* label = blobs_.labels.row(y);
-    std::uint8_t* mask = left_.mask.row(y);
-    for (int x = 0; x < setup_.width; ++x) mask[x] = label[x] != 0 ? 255 : 0;
-  }
+  mask_of_labels(blobs_.labels, left_.mask);
   FrameResult result;
   result.ordinal = pair.ordinal;
   result.capture_time = pair.capture_time;
@@ -300,8 +296,8 @@ void Pipeline::ingest(const FramePair& pair) noexcept {
   gray(pair.right, right_.y);
   equalise_right_.run(right_.y);
   smooth3x3(right_.y, right_.smooth_y);
-  rectifier_->rectify(left_.y, View::kLeft, left_.canvas);
-  rectifier_->rectify(right_.y, View::kRight, right_.canvas);
+  left_.canvas.show(left_.y);
+  right_.canvas.show(right_.y);
 }
 
 AdaptiveBackground::Planes Pipeline::left_planes() const noexcept {
@@ -345,9 +341,9 @@ void Pipeline::foreground_from_model() noexcept {
   if (!rectifier_) return;
   background_right_->distance({right_.smooth_y, {}, {}}, right_.distance);
   (void)foreground_right_->run(right_.distance, right_.mask);
-  rectifier_->rectify(right_.mask, View::kRight, right_moving_, Sampling::kNearest);
-  rectifier_->rectify(background_left_->luma(), View::kLeft, left_.background_canvas);
-  rectifier_->rectify(background_right_->luma(), View::kRight, right_.background_canvas);
+  right_moving_.show(right_.mask);
+  left_.background_canvas.show(background_left_->luma());
+  right_.background_canvas.show(background_right_->luma());
   if (frames_ > 1 && config_.shadow.method == ShadowMethod::kStereo) renew_background_disparity();
 }
 
@@ -420,13 +416,32 @@ Rect Pipeline::paint_on_canvas(const Rect& box, std::uint16_t label) noexcept {
   return roi;
 }
 
-void Pipeline::run_matcher(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, const Rect& roi,
-                           DisparityRange range, ImageView<std::uint16_t> out) noexcept {
+// What of the right canvas the candidates of a part of the left one reach.
+Rect Pipeline::partners_of(const Rect& part, DisparityRange range) const noexcept {
+  return {part.left - rectifier_->geometry().offset - range.max, part.top, part.width + range.max - range.min,
+          part.height};
+}
+
+void Pipeline::run_matcher(LazyCanvas& left, LazyCanvas& right, const Rect& roi, DisparityRange range,
+                           ImageView<std::uint16_t> out) noexcept {
+  const Rect seen = grown(roi, config_.disparity.block / 2 + CensusMatcher::kReach);
+  const ImageView<const std::uint8_t> left_picture = left.with(seen);
+  const ImageView<const std::uint8_t> right_picture = right.with(partners_of(seen, range));
   if (sad_) {
-    (void)sad_->run_region(left, right, roi, wanted_, range, out);
+    (void)sad_->run_region(left_picture, right_picture, roi, wanted_, range, out);
   } else {
-    (void)census_->run_region(left, right, roi, wanted_, range, out);
+    (void)census_->run_region(left_picture, right_picture, roi, wanted_, range, out);
   }
+}
+
+// The region in canvas_labels_, all of its pixels together; right_moving may be an empty canvas. found: false where
+// matching failed.
+RegionMatch Pipeline::match_region(LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving, const Rect& roi,
+                                   DisparityRange range) noexcept {
+  const Rect partners = grown(partners_of(roi, range), region_matcher_->config().row_tolerance);
+  const Result<RegionMatch> found = region_matcher_->run<std::uint16_t>(
+      left.with(roi), right.with(partners), canvas_labels_, 1, roi, range, right_moving.with(partners));
+  return found.has_value() ? *found : RegionMatch{};
 }
 
 // The background hardly changes and matching all of it costs much, so each frame renews a strip of rows: the whole
@@ -471,9 +486,9 @@ void Pipeline::match_blob(const Blob& blob) noexcept {
 
 void Pipeline::match_dense() noexcept {
   if (sad_) {
-    (void)sad_->run(left_.canvas, right_.canvas, canvas_disparity_);
+    (void)sad_->run(left_.canvas.whole(), right_.canvas.whole(), canvas_disparity_);
   } else {
-    (void)census_->run(left_.canvas, right_.canvas, canvas_disparity_);
+    (void)census_->run(left_.canvas.whole(), right_.canvas.whole(), canvas_disparity_);
   }
 }
 
@@ -561,11 +576,7 @@ void Pipeline::reject_background() noexcept {
 }
 
 void Pipeline::remove_shadows() noexcept {
-  for (int y = 0; y < setup_.height; ++y) {
-    const std::uint16_t* label = blobs_.labels.row(y);
-    std::uint8_t* mask = left_.mask.row(y);
-    for (int x = 0; x < setup_.width; ++x) mask[x] = label[x] != 0 ? 255 : 0;
-  }
+  mask_of_labels(blobs_.labels, left_.mask);
   if (config_.shadow.method == ShadowMethod::kOff) return;
   if (config_.shadow.method == ShadowMethod::kChroma) {
     if (!setup_.colour) return;
@@ -602,6 +613,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
   if (!sparse && !small && !judges_surface) return;
   const Rect roi = paint_on_canvas(candidate.box, candidate.label);
   if (roi.empty()) return;
+  LazyCanvas nowhere;
   DisparityRange range{0, full_range_};
   if (candidate.claim >= 0) {
     const Prediction& target = in.predictions[static_cast<std::size_t>(candidate.claim)];
@@ -611,13 +623,10 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
       range.max = std::clamp(static_cast<int>(target.disparity + room) + 1, range.min, full_range_);
     }
   }
-  const auto match = [&](ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                         ImageView<const std::uint8_t> right_moving) {
-    const Result<RegionMatch> found =
-        region_matcher_->run<std::uint16_t>(left, right, canvas_labels_, 1, roi, range, right_moving);
-    const bool good = found.has_value() && found->found && found->uniqueness >= kUnique &&
-                      (right_moving.empty() || found->foreground_share >= 0.5);
-    return good ? *found : RegionMatch{};
+  const auto match = [&](LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving) {
+    const RegionMatch found = match_region(left, right, right_moving, roi, range);
+    // Without a picture of what moves on the right, all of the region is said to fall on it.
+    return found.found && found.uniqueness >= kUnique && found.foreground_share >= 0.5 ? found : RegionMatch{};
   };
   if (sparse || small) {
     const RegionMatch now = match(left_.canvas, right_.canvas, right_moving_);
@@ -642,7 +651,8 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
     double before = -1;
     if (known * 3 >= candidate.area) {
       before = static_cast<double>(sum) / known / kDisparityScale;
-    } else if (const RegionMatch whole = match(left_.background_canvas, right_.background_canvas, {}); whole.found) {
+    } else if (const RegionMatch whole = match(left_.background_canvas, right_.background_canvas, nowhere);
+               whole.found) {
       before = whole.disparity_px;
     }
     const double limit =
@@ -658,13 +668,13 @@ bool Pipeline::fits_at(double disparity, const Rect& roi, int area) noexcept {
   if (area > config_.disparity.small_px) return false;
   const int middle = static_cast<int>(disparity + 0.5);
   const DisparityRange near{std::max(middle - 1, 0), std::min(middle + 1, full_range_)};
+  LazyCanvas nowhere;
   const auto match = [&](DisparityRange range) {
-    return region_matcher_->run<std::uint16_t>(left_.canvas, right_.canvas, canvas_labels_, 1, roi, range, {});
+    return match_region(left_.canvas, right_.canvas, nowhere, roi, range);
   };
-  const Result<RegionMatch> here = match(near);
-  const Result<RegionMatch> anywhere = match({0, full_range_});
-  return here.has_value() && anywhere.has_value() && here->found && anywhere->found &&
-         here->cost <= kUnique * std::max(anywhere->cost, kLeastCost);
+  const RegionMatch here = match(near);
+  const RegionMatch anywhere = match({0, full_range_});
+  return here.found && anywhere.found && here.cost <= kUnique * std::max(anywhere.cost, kLeastCost);
 }
 
 // Half of the region's pixels look like the background under another light.

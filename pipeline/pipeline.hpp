@@ -9,6 +9,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
 #include "pipeline/frame.hpp"
+#include "pipeline/geometry/lazy_canvas.hpp"
 #include "pipeline/geometry/rectify.hpp"
 #include "pipeline/motion/mean_background.hpp"
 #include "pipeline/pipeline_config.hpp"
@@ -89,8 +90,8 @@ class Pipeline {
     ImageView<std::uint8_t> smooth_cr;
     ImageView<std::uint8_t> distance;
     ImageView<std::uint8_t> mask;
-    ImageView<std::uint8_t> canvas;             ///< luma, rectified
-    ImageView<std::uint8_t> background_canvas;  ///< background's luma, rectified
+    LazyCanvas canvas;             ///< luma, rectified
+    LazyCanvas background_canvas;  ///< background's luma, rectified
   };
 
   explicit Pipeline(const PipelineConfig& config, const Setup& setup) noexcept : config_(config), setup_(setup) {}
@@ -122,8 +123,11 @@ class Pipeline {
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
   [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;
   [[nodiscard]] Rect paint_on_canvas(const Rect& box, std::uint16_t label) noexcept;
-  void run_matcher(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right, const Rect& roi,
-                   DisparityRange range, ImageView<std::uint16_t> out) noexcept;
+  [[nodiscard]] Rect partners_of(const Rect& part, DisparityRange range) const noexcept;
+  void run_matcher(LazyCanvas& left, LazyCanvas& right, const Rect& roi, DisparityRange range,
+                   ImageView<std::uint16_t> out) noexcept;
+  [[nodiscard]] RegionMatch match_region(LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving, const Rect& roi,
+                                         DisparityRange range) noexcept;
 
   PipelineConfig config_;
   Setup setup_;
@@ -150,7 +154,7 @@ class Pipeline {
   ImageView<std::uint16_t> canvas_disparity_;
   ImageView<std::uint16_t> canvas_background_;  ///< background's disparity, renewed a strip of rows a frame
   int renewed_rows_ = 0;                        ///< of canvas_background_, since the background began
-  ImageView<std::uint8_t> right_moving_;        ///< right canvas: foreground of the right view
+  LazyCanvas right_moving_;                     ///< right canvas: foreground of the right view
 
   Equalise equalise_left_{{}};
   Equalise equalise_right_{{}};

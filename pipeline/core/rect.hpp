@@ -45,6 +45,11 @@ struct Rect {
   return {left, top, std::max(a.right(), b.right()) - left, std::max(a.bottom(), b.bottom()) - top};
 }
 
+/// With `margin` more to each side.
+[[nodiscard]] inline Rect grown(const Rect& a, int margin) noexcept {
+  return {a.left - margin, a.top - margin, a.width + 2 * margin, a.height + 2 * margin};
+}
+
 /// Columns or rows between two boxes, the larger of both; 0 if they touch [px].
 [[nodiscard]] inline int gap(const Rect& a, const Rect& b) noexcept {
   const int across = std::max({a.left - b.right(), b.left - a.right(), 0});

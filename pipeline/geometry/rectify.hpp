@@ -95,6 +95,9 @@ class Rectifier {
   void rectify(ImageView<const std::uint8_t> raw, View view, ImageView<std::uint8_t> out,
                Sampling sampling = Sampling::kBilinear) const noexcept;
 
+  /// The map behind rectify(), for who draws parts of a canvas. Lives as long as the arena.
+  [[nodiscard]] const RemapTable& table(View view) const noexcept { return of(view).table; }
+
   /// 255 where the canvas shows a place of the raw picture, else 0.
   [[nodiscard]] ImageView<const std::uint8_t> mask(View view) const noexcept { return of(view).table.mask; }
 

@@ -182,6 +182,13 @@ void RemapTable::find_windows(int raw_width, int raw_height) noexcept {
   }
 }
 
+RemapTable RemapTable::columns(int begin, int end) const noexcept {
+  const auto part = [&](auto picture) { return picture.window(begin, 0, end - begin, picture.height); };
+  const int blocks = (end - begin + kBlock - 1) / kBlock;
+  return {part(corner), part(fractions), part(mask), window.window(begin / kBlock, 0, blocks, window.height),
+          part(place)};
+}
+
 void remap_row_reference(ImageView<const std::uint8_t> raw, const RemapTable& table, int row, Sampling sampling,
                          std::uint8_t* out) noexcept {
   remap_pixels(raw, table, row, sampling, 0, table.corner.width, out);

@@ -29,6 +29,9 @@ struct RemapTable {
   ImageView<std::uint8_t> place;  ///< column, and kSecondRow if it is in the second row
   static constexpr std::uint8_t kSecondRow = 16;
 
+  /// The map of columns [begin, end) alone. begin: a multiple of kBlock.
+  [[nodiscard]] RemapTable columns(int begin, int end) const noexcept;
+
   /// Fills `window` and `place` from the rest. Set-up only.
   void find_windows(int raw_width, int raw_height) noexcept;
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "pipeline/core/image_view.hpp"
+#include "pipeline/shape/bits_kernel.hpp"
 
 namespace stereotrack {
 
@@ -25,35 +26,36 @@ struct ChromaTest {
     std::uint64_t n = 0;
     std::array<std::uint64_t, 2> sum{};
     std::array<std::uint64_t, 2> squares{};
-    for (int y = 0; y < mask.height; ++y) {
-      for (int x = 0; x < mask.width; ++x) {
-        if (mask.at(x, y) == 0) continue;
-        const std::uint64_t b = cb.at(x, y);
-        const std::uint64_t r = cr.at(x, y);
-        ++n;
-        sum[0] += b;
-        sum[1] += r;
-        squares[0] += b * b;
-        squares[1] += r * r;
+    const auto for_each_segmented = [&](auto&& fn) {
+      for (int y = 0; y < mask.height; ++y) {
+        for_each_set_run(mask.row(y), mask.width, [&](int begin, int end) {
+          for (int x = begin; x < end; ++x) fn(x, y);
+        });
       }
-    }
+    };
+    for_each_segmented([&](int x, int y) {
+      const std::uint64_t b = cb.at(x, y);
+      const std::uint64_t r = cr.at(x, y);
+      ++n;
+      sum[0] += b;
+      sum[1] += r;
+      squares[0] += b * b;
+      squares[1] += r * r;
+    });
     // n^2 sigma^2 = n sum x^2 - (sum x)^2; |a - b| < sigma  <=>  n^2 (a - b)^2 < n^2 sigma^2.
     const std::uint64_t variance_b = n * squares[0] - sum[0] * sum[0];
     const std::uint64_t variance_r = n * squares[1] - sum[1] * sum[1];
     std::uint32_t cleared = 0;
-    for (int y = 0; y < mask.height; ++y) {
-      for (int x = 0; x < mask.width; ++x) {
-        if (mask.at(x, y) == 0) continue;
-        const auto db = static_cast<std::int64_t>(cb.at(x, y)) - cb_background.at(x, y);
-        const auto dr = static_cast<std::int64_t>(cr.at(x, y)) - cr_background.at(x, y);
-        const bool same_b = n * n * static_cast<std::uint64_t>(db * db) < variance_b;
-        const bool same_r = n * n * static_cast<std::uint64_t>(dr * dr) < variance_r;
-        if (same_b && same_r) {
-          mask.at(x, y) = 0;
-          ++cleared;
-        }
+    for_each_segmented([&](int x, int y) {
+      const auto db = static_cast<std::int64_t>(cb.at(x, y)) - cb_background.at(x, y);
+      const auto dr = static_cast<std::int64_t>(cr.at(x, y)) - cr_background.at(x, y);
+      const bool same_b = n * n * static_cast<std::uint64_t>(db * db) < variance_b;
+      const bool same_r = n * n * static_cast<std::uint64_t>(dr * dr) < variance_r;
+      if (same_b && same_r) {
+        mask.at(x, y) = 0;
+        ++cleared;
       }
-    }
+    });
     return cleared;
   }
 };

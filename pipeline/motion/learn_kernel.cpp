@@ -1,6 +1,7 @@
 #include "pipeline/motion/learn_kernel.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdlib>
 #include <utility>
 
@@ -84,13 +85,68 @@ Word step_towards(Word from, Word to, Float even_reciprocal, Float odd_reciproca
   return hn::IfThenElse(at_least(to, from), hn::Add(from, step), hn::Sub(from, step));
 }
 
+// One divisor d of all lanes, 2 <= d < 2^15, as a multiplication (Granlund and Montgomery, "Division by invariant
+// integers using multiplication", 1994): with l = ceil(log2 d) and m = floor(2^16 (2^l - d) / d) + 1,
+//     n / d = (t + (n - t) / 2) / 2^(l - 1),  t = m n / 2^16,    each rounded down, exactly for n < 2^16.
+struct Divisor {
+  explicit Divisor(int d)
+      : shift(static_cast<int>(std::bit_width(static_cast<unsigned>(d - 1))) - 1),
+        factor(word((65536 * ((2 << shift) - d)) / d + 1)) {}
+  int shift;  ///< l - 1
+  Word factor;
+};
+Word divide(Word n, const Divisor& by) {
+  const Word t = hn::MulHigh(by.factor, n);
+  return hn::ShiftRightSame(hn::Add(t, hn::ShiftRight<1>(hn::Sub(n, t))), by.shift);
+}
+
+/// Each lane's own divisor.
+struct Divisors {
+  explicit Divisors(Word d) : even(even_reciprocal(d)), odd(odd_reciprocal(d)) {}
+  Float even;
+  Float odd;
+};
+Word divide(Word n, const Divisors& by) { return divide(n, by.even, by.odd); }
+
+/// From one value to another: one of the ways is 0, the other is their distance.
+struct Apart {
+  Apart(Word from, Word to) : up(hn::SaturatedSub(to, from)), down(hn::SaturatedSub(from, to)) {}
+  [[nodiscard]] Word distance() const { return hn::Or(up, down); }
+  /// As step_towards(); the step is no longer than the way.
+  template <class By>
+  [[nodiscard]] Word step_from(Word from, const By& by) const {
+    const Word step = divide(distance(), by);
+    return hn::Sub(hn::Add(from, hn::Min(step, up)), hn::Min(step, down));
+  }
+  Word up;
+  Word down;
+};
+
 Word now_of(const LearnRow::Channel& channel, int x) {
   const hn::Rebind<std::uint8_t, Words> d8;
   return hn::ShiftLeft<8>(hn::PromoteTo(kWords, hn::LoadU(d8, channel.now + x)));
 }
 
-// Vectors in which not all pixels are background: each kind is worked out for all lanes, and each takes its own.
-// rate: of background pixels.
+// Vectors in which all pixels are background.
+template <class By>
+void learn_calm(const LearnRow& row, const LearnRates& rates, int x, const By& by_rate, const By& by_slower) {
+  for (int c = 0; c < row.count; ++c) {
+    const LearnRow::Channel& channel = row.channels[c];
+    const Word mean = hn::LoadU(kWords, channel.mean + x);
+    const Word deviation = hn::LoadU(kWords, channel.deviation + x);
+    const Apart from_mean(mean, now_of(channel, x));
+    const Apart from_deviation(deviation, from_mean.distance());
+    hn::StoreU(from_mean.step_from(mean, by_rate), kWords, channel.mean + x);
+    hn::StoreU(from_deviation.step_from(deviation, by_slower), kWords, channel.deviation + x);
+  }
+  const Word one = word(1);
+  const Word age = hn::Add(hn::LoadU(kWords, row.age + x), one);
+  hn::StoreU(hn::Min(age, word(rates.absorb)), kWords, row.age + x);
+  hn::StoreU(hn::SaturatedSub(hn::LoadU(kWords, row.candidate_age + x), one), kWords, row.candidate_age + x);
+}
+
+// Vectors in which not all pixels are background: each kind is worked out for all lanes, and each
+// takes its own. rate: of background pixels.
 int learn_mixed(const LearnRow& row, const LearnRates& rates, int x, Word mask, Word rate) {
   const Word zero = hn::Zero(kWords);
   const Word one = word(1);
@@ -151,13 +207,9 @@ int learn(const LearnRow& row, const LearnRates& rates, int width) {
   const Word zero = hn::Zero(kWords);
   const Word one = word(1);
   const Word window = word(rates.window);
-  const Word absorb = word(rates.absorb);
-  const Word prior = word(kPriorFrames);
   Word rate = window;
-  Float rate_even = even_reciprocal(rate);
-  Float rate_odd = odd_reciprocal(rate);
-  Float slower_even = even_reciprocal(hn::Add(rate, prior));
-  Float slower_odd = odd_reciprocal(hn::Add(rate, prior));
+  Divisor by_rate(rates.window);
+  Divisor by_slower(rates.window + kPriorFrames);
   int changed = 0;
   int x = 0;
   for (; x + lanes <= width; x += lanes) {
@@ -168,25 +220,18 @@ int learn(const LearnRow& row, const LearnRates& rates, int width) {
       changed += learn_mixed(row, rates, x, mask, rate_here);
       continue;
     }
-    // Neighbours are mostly of one age, above all after a while: then nothing is divided by anew.
+    // Neighbours are mostly of one age, above all after a while.
     if (!hn::AllTrue(kWords, hn::Eq(rate, rate_here))) {
+      const int first = hn::GetLane(rate_here);
+      if (!hn::AllTrue(kWords, hn::Eq(word(first), rate_here))) {
+        learn_calm(row, rates, x, Divisors(rate_here), Divisors(hn::Add(rate_here, word(kPriorFrames))));
+        continue;
+      }
       rate = rate_here;
-      rate_even = even_reciprocal(rate);
-      rate_odd = odd_reciprocal(rate);
-      slower_even = even_reciprocal(hn::Add(rate, prior));
-      slower_odd = odd_reciprocal(hn::Add(rate, prior));
+      by_rate = Divisor(first);
+      by_slower = Divisor(first + kPriorFrames);
     }
-    for (int c = 0; c < row.count; ++c) {
-      const LearnRow::Channel& channel = row.channels[c];
-      const Word now = now_of(channel, x);
-      const Word mean = hn::LoadU(kWords, channel.mean + x);
-      const Word deviation = hn::LoadU(kWords, channel.deviation + x);
-      hn::StoreU(step_towards(mean, now, rate_even, rate_odd), kWords, channel.mean + x);
-      hn::StoreU(step_towards(deviation, distance_of(now, mean), slower_even, slower_odd), kWords,
-                 channel.deviation + x);
-    }
-    hn::StoreU(hn::Min(hn::Add(age, one), absorb), kWords, row.age + x);
-    hn::StoreU(hn::SaturatedSub(hn::LoadU(kWords, row.candidate_age + x), one), kWords, row.candidate_age + x);
+    learn_calm(row, rates, x, by_rate, by_slower);
   }
   LearnRow rest = row;
   for (int c = 0; c < row.count; ++c) {

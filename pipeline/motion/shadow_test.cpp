@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "pipeline/shape/bits_kernel.hpp"
 #include "pipeline/stereo/disparity.hpp"
 
 namespace stereotrack {
@@ -96,15 +97,18 @@ void ShadowTest::judge_row(const Input& in, int y, const std::uint8_t* mask) noe
     }
     return kLook;
   };
-  for (int x = 0; x < verdicts_.width; ++x) verdicts[x] = mask[x] == 0 ? kOutside : by_depth(x);
-  for_each_run(
-      0, verdicts_.width, [&](int x) { return verdicts[x] >= kLook; },
-      [&](int from, int to) {
-        look(in, y, from, to);
-        for (int x = from; x < to; ++x) {
-          verdicts[x] = looks_like_background(in, x, y, verdicts[x] == kLookWide) ? kBackground : kObject;
-        }
-      });
+  std::fill_n(verdicts, verdicts_.width, static_cast<std::int8_t>(kOutside));
+  for_each_set_run(mask, verdicts_.width, [&](int begin, int end) {
+    for (int x = begin; x < end; ++x) verdicts[x] = by_depth(x);
+    for_each_run(
+        begin, end, [&](int x) { return verdicts[x] >= kLook; },
+        [&](int from, int to) {
+          look(in, y, from, to);
+          for (int x = from; x < to; ++x) {
+            verdicts[x] = looks_like_background(in, x, y, verdicts[x] == kLookWide) ? kBackground : kObject;
+          }
+        });
+  });
 }
 
 std::uint32_t ShadowTest::run(const Input& in, ImageView<std::uint8_t> mask) noexcept {

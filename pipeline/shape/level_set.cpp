@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cstring>
 #include <utility>
 
 #include "pipeline/shape/region.hpp"
@@ -19,6 +21,19 @@ constexpr int kReach = 3;
 constexpr std::array<int, 2 * kReach + 1> kHalfWidth = {1, 2, 3, 3, 3, 2, 1};
 constexpr int kPairsPerPixel = 26;
 
+// A sum of 0, so that sums of -37..37 are bytes without a sign, which eight at a time may change by two.
+constexpr std::uint8_t kNoSum = 64;
+
+// Twos in the bytes of a row of eight that begins kReach before the disc's middle, where the disc is.
+static_assert(std::endian::native == std::endian::little, "the first pixel must be a word's lowest byte");
+constexpr std::array<std::uint64_t, kHalfWidth.size()> kTwos = [] {
+  std::array<std::uint64_t, kHalfWidth.size()> rows{};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (int x = -kHalfWidth[i]; x <= kHalfWidth[i]; ++x) rows[i] |= std::uint64_t{2} << (8 * (x + kReach));
+  }
+  return rows;
+}();
+
 }  // namespace
 
 Result<LevelSet> LevelSet::create(const Config& config, int width, int height, Arena& arena) noexcept {
@@ -34,12 +49,14 @@ Result<LevelSet> LevelSet::create(const Config& config, int width, int height, A
   const std::size_t framed =
       (static_cast<std::size_t>(width) + 2 * kReach) * (static_cast<std::size_t>(height) + 2 * kReach);
   stage.side_ = arena.array<std::int8_t>(framed);
+  stage.around_ = arena.array<std::uint8_t>(framed + sizeof(std::uint64_t));
+  for (std::span<std::int8_t>& sums : stage.row_sums_) sums = arena.array<std::int8_t>(static_cast<std::size_t>(width));
   stage.feature_ = arena.array<std::uint8_t>(framed);
   stage.queued_ = arena.array<std::uint8_t>(framed);
   stage.band_ = arena.array<std::int32_t>(framed);
   stage.next_band_ = arena.array<std::int32_t>(framed);
-  if (stage.side_.empty() || stage.feature_.empty() || stage.queued_.empty() || stage.band_.empty() ||
-      stage.next_band_.empty()) {
+  if (stage.side_.empty() || stage.around_.empty() || stage.row_sums_.back().empty() || stage.feature_.empty() ||
+      stage.queued_.empty() || stage.band_.empty() || stage.next_band_.empty()) {
     return fail(Fault::kOutOfMemory);
   }
   return stage;
@@ -59,9 +76,7 @@ Result<LevelSet::Outcome> LevelSet::run(ImageView<const std::uint8_t> feature, I
     outcome.converged = true;
     return outcome;
   }
-  const int margin = config_.margin_px;
-  domain_ = intersect({start.left - margin, start.top - margin, start.width + 2 * margin, start.height + 2 * margin},
-                      picture);
+  domain_ = intersect(grown(start, config_.margin_px), picture);
   load(feature, labels, label);
   const std::int64_t data_start = in_.energy() + out_.energy();
   while (!outcome.converged && outcome.iterations < config_.max_iterations) {
@@ -91,6 +106,7 @@ void LevelSet::load(ImageView<const std::uint8_t> feature, ImageView<const std::
   const std::int32_t framed = stride_ * (domain_.height + 2 * kReach);
   std::fill_n(side_.begin(), framed, kNone);
   std::fill_n(queued_.begin(), framed, std::uint8_t{0});
+  std::fill_n(around_.begin(), static_cast<std::size_t>(framed) + sizeof(std::uint64_t), kNoSum);
   in_ = {};
   out_ = {};
   parted_ = 0;
@@ -114,6 +130,7 @@ void LevelSet::load(ImageView<const std::uint8_t> feature, ImageView<const std::
   }
   in_.renew_mean();
   out_.renew_mean();
+  sum_discs();
   for (int y = 0; y < domain_.height; ++y) {
     for (int x = 0; x < domain_.width; ++x) {
       if (on_contour(at(x, y))) queue(at(x, y));
@@ -128,10 +145,9 @@ int LevelSet::sweep() noexcept {
   for (std::int32_t i = 0; i < band_size; ++i) queued_[band_[i]] = 0;
 
   // (I - c_out)^2 - (I - c_in)^2: what belonging inside is worth.
-  std::array<std::int64_t, 256> worth;
   const std::int64_t span = out_.mean - in_.mean;
   const std::int64_t sum = out_.mean + in_.mean;
-  for (int value = 0; value < 256; ++value) worth[value] = span * (sum - 512 * value);
+  const auto worth = [span, sum](int value) { return span * (sum - 512 * value); };
 
   int changed = 0;
   for (std::int32_t i = 0; i < band_size; ++i) {
@@ -140,27 +156,54 @@ int LevelSet::sweep() noexcept {
     queue(p);
     const std::int8_t side = side_[p];
     const std::uint8_t value = feature_[p];
-    const int parted = side * balance(p);  // neighbours on its side are parted from it, those on the other joined
-    if (side * worth[value] + pair_weight() * parted >= 0) continue;
+    // Neighbours on its side are parted from it, those on the other joined.
+    const int parted = side * (around_[p] - kNoSum - side);
+    if (side * worth(value) + pair_weight() * parted >= 0) continue;
     in_.add(value, -side);
     out_.add(value, side);
     parted_ += parted;
-    side_[p] = static_cast<std::int8_t>(-side);
+    flip(p);
     ++changed;
     for (const std::int32_t neighbour : {p - stride_, p - 1, p + 1, p + stride_}) queue(neighbour);
   }
   return changed;
 }
 
-/// Neighbours inside less neighbours outside.
-int LevelSet::balance(std::int32_t p) const noexcept {
-  int sum = -side_[p];
-  const std::int8_t* row = &side_[p] - kReach * stride_;
-  for (const int half : kHalfWidth) {
-    for (int x = -half; x <= half; ++x) sum += row[x];
+// Of the whole domain, from nothing; flip() keeps them up to date. Each row of sides is summed over 3, 5 and 7 pixels,
+// and what a disc around a pixel above or below takes of it is added there.
+void LevelSet::sum_discs() noexcept {
+  const int width = domain_.width;
+  for (int y = 0; y < domain_.height; ++y) {
+    const std::int8_t* row = &side_[at(0, y)];
+    const std::array<std::int8_t*, kReach> sums{row_sums_[0].data(), row_sums_[1].data(), row_sums_[2].data()};
+    for (int x = 0; x < width; ++x) {
+      const int three = row[x - 1] + row[x] + row[x + 1];
+      const int five = three + row[x - 2] + row[x + 2];
+      sums[0][x] = static_cast<std::int8_t>(three);
+      sums[1][x] = static_cast<std::int8_t>(five);
+      sums[2][x] = static_cast<std::int8_t>(five + row[x - 3] + row[x + 3]);
+    }
+    for (int v = -kReach; v <= kReach; ++v) {
+      const std::int8_t* part = sums[static_cast<std::size_t>(kHalfWidth[static_cast<std::size_t>(v + kReach)]) - 1];
+      std::uint8_t* around = &around_[at(0, y + v)];
+      for (int x = 0; x < width; ++x) around[x] = static_cast<std::uint8_t>(around[x] + part[x]);
+    }
+  }
+}
+
+// To the other side. Sums in the frame around the domain change with the others: nobody reads them, and as their discs
+// lie mostly outside they stay bytes, too.
+void LevelSet::flip(std::int32_t p) noexcept {
+  const bool leaves = side_[p] == kIn;
+  side_[p] = leaves ? kOut : kIn;
+  std::uint8_t* row = &around_[p] - kReach * stride_ - kReach;
+  for (const std::uint64_t twos : kTwos) {
+    std::uint64_t eight;
+    std::memcpy(&eight, row, sizeof eight);
+    eight = leaves ? eight - twos : eight + twos;
+    std::memcpy(row, &eight, sizeof eight);
     row += stride_;
   }
-  return sum;
 }
 
 bool LevelSet::on_contour(std::int32_t p) const noexcept {

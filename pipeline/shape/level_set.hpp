@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -84,7 +85,8 @@ class LevelSet {
 
   void load(ImageView<const std::uint8_t> feature, ImageView<const std::uint16_t> labels, std::uint16_t label) noexcept;
   [[nodiscard]] int sweep() noexcept;  // how many pixels changed sides
-  [[nodiscard]] int balance(std::int32_t p) const noexcept;
+  void sum_discs() noexcept;
+  void flip(std::int32_t p) noexcept;
   [[nodiscard]] bool on_contour(std::int32_t p) const noexcept;
   void queue(std::int32_t p) noexcept;
   [[nodiscard]] std::int64_t pair_weight() const noexcept;  // of a parted pair [grey^2 / 65536]
@@ -99,7 +101,9 @@ class LevelSet {
   Phase out_;
   std::int64_t parted_ = 0;  // pairs parted by the contour, less those at the start
   // The domain with a frame around it, as wide as pairs reach, rows stride_ apart.
-  std::span<std::int8_t> side_;  // 1 inside, -1 outside, 0 not in the domain
+  std::span<std::int8_t> side_;     // 1 inside, -1 outside, 0 not in the domain
+  std::span<std::uint8_t> around_;  // sum of side_ over the disc of pairs, its middle included, from kNoSum up
+  std::array<std::span<std::int8_t>, 3> row_sums_;  // of a row of side_, over 3, 5 and 7 pixels
   std::span<std::uint8_t> feature_;
   std::span<std::uint8_t> queued_;
   std::span<std::int32_t> band_;

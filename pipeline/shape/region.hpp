@@ -31,6 +31,31 @@ void for_each_pixel(ImageView<const std::uint16_t> labels, const Rect& box, std:
   }
 }
 
+/// Calls fn(y, begin, end) for each run of the region's pixels in a row, in raster order. O(box).
+template <class Fn>
+void for_each_run(ImageView<const std::uint16_t> labels, const Rect& box, std::uint16_t label, Fn&& fn) noexcept {
+  const Rect part = intersect(box, {0, 0, labels.width, labels.height});
+  for (int y = part.top; y < part.bottom(); ++y) {
+    const std::uint16_t* row = labels.row(y);
+    for (int x = part.left; x < part.right(); ++x) {
+      if (row[x] != label) continue;
+      const int begin = x;
+      while (x < part.right() && row[x] == label) ++x;
+      fn(y, begin, x);
+    }
+  }
+}
+
+/// 255 where a pixel has a label, else 0. Sizes must agree. O(pixels).
+inline void mask_of_labels(ImageView<const std::uint16_t> labels, ImageView<std::uint8_t> mask) noexcept {
+  const int width = labels.width;  // a local, which bytes written do not alias: else nothing is vectorised
+  for (int y = 0; y < labels.height; ++y) {
+    const std::uint16_t* label = labels.row(y);
+    std::uint8_t* out = mask.row(y);
+    for (int x = 0; x < width; ++x) out[x] = label[x] != 0 ? 255 : 0;
+  }
+}
+
 /// Calls fn(x, y) for each pixel of the region with a 4-neighbour that has another label, in raster order:
 /// the inner boundary. The end of the picture is not a boundary: there the object goes on unseen. O(box).
 template <class Fn>
@@ -53,19 +78,24 @@ void for_each_boundary_pixel(ImageView<const std::uint16_t> labels, const Rect& 
   blob.label = label;
   std::int64_t sum_x = 0;
   std::int64_t sum_y = 0;
-  Rect tight;
-  for_each_pixel(labels, box, label, [&](int x, int y) noexcept {
-    if (blob.area == 0) blob.first = {x, y};
-    ++blob.area;
-    sum_x += x;
-    sum_y += y;
-    tight = unite(tight, {x, y, 1, 1});
+  int left = labels.width;
+  int right = 0;
+  int bottom = 0;
+  for_each_run(labels, box, label, [&](int y, int begin, int end) noexcept {
+    const int length = end - begin;
+    if (blob.area == 0) blob.first = {begin, y};
+    blob.area += length;
+    sum_x += static_cast<std::int64_t>(length) * (begin + end - 1) / 2;
+    sum_y += static_cast<std::int64_t>(length) * y;
+    left = std::min(left, begin);
+    right = std::max(right, end);
+    bottom = y + 1;
   });
   if (blob.area == 0) return blob;
-  blob.box = tight;
+  blob.box = {left, blob.first.y, right - left, bottom - blob.first.y};
   blob.center_x = static_cast<double>(sum_x) / blob.area;
   blob.center_y = static_cast<double>(sum_y) / blob.area;
-  blob.sides = sides_touched(tight, labels.width, labels.height);
+  blob.sides = sides_touched(blob.box, labels.width, labels.height);
   return blob;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
@@ -30,9 +29,6 @@ class Sobel {
  private:
   int width_ = 0;
   int height_ = 0;
-  // One row of the separable kernels' vertical halves, with one replicated element at each end.
-  std::span<std::int16_t> smooth_;
-  std::span<std::int16_t> slope_;
 };
 
 }  // namespace stereotrack

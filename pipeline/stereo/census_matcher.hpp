@@ -34,6 +34,8 @@ namespace stereotrack {
 /// Memory: (block + 2) bytes x width x largest range, 20 bytes a pixel for the filter. One instance a thread.
 class CensusMatcher {
  public:
+  static constexpr int kReach = 3;  ///< columns and rows that a code takes in around its pixel [px]
+
   struct Config {
     int width = 0;        ///< left picture [px], 1..8192
     int height = 0;       ///< both pictures [px], 1..8192

@@ -28,11 +28,9 @@ Result<RegionMatcher> RegionMatcher::create(const Config& config, Arena& arena) 
   }
   const auto lanes = static_cast<std::size_t>(c.disparities);
   const auto rows = static_cast<std::size_t>(2 * c.row_tolerance + 1);
-  m.samples_ = arena.array<Sample>(static_cast<std::size_t>(c.largest_sample));
-  m.differences_ = arena.array<std::int32_t>(lanes);
-  m.squares_ = arena.array<std::int32_t>(lanes);
-  m.foreground_ = arena.array<std::int32_t>(lanes);
-  m.pixels_ = arena.array<std::int32_t>(lanes);
+  m.samples_ = arena.array<RegionSample>(static_cast<std::size_t>(c.largest_sample));
+  m.sums_ = {arena.array<std::int32_t>(lanes), arena.array<std::int32_t>(lanes), arena.array<std::int32_t>(lanes),
+             arena.array<std::int32_t>(lanes)};
   m.scores_ = arena.array<double>(lanes * rows);
   m.shares_ = arena.array<double>(lanes * rows);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
@@ -55,47 +53,28 @@ void RegionMatcher::score_row_offset(ImageView<const std::uint8_t> right,
                                      ImageView<const std::uint8_t> right_foreground, DisparityRange range,
                                      int row_offset, double* scores, double* shares) noexcept {
   const int lanes = range.count();
-  std::fill_n(differences_.data(), lanes, 0);
-  std::fill_n(squares_.data(), lanes, 0);
-  std::fill_n(foreground_.data(), lanes, 0);
-  std::fill_n(pixels_.data(), lanes, 0);
-  for (const Sample& sample : samples_.first(static_cast<std::size_t>(sample_size_))) {
-    const int y = sample.y + row_offset;
-    if (y < 0 || y >= right.height) continue;
-    // Lane i is disparity range.max - i: right columns then rise with i.
-    const int column = sample.x - config_.offset - range.max;
-    const int begin = std::clamp(-column, 0, lanes);
-    const int end = std::clamp(right.width - column, begin, lanes);
-    if (begin == end) continue;
-    const std::uint8_t* __restrict partners = right.row(y) + (column + begin);
-    std::int32_t* __restrict differences = differences_.data() + begin;
-    std::int32_t* __restrict squares = squares_.data() + begin;
-    std::int32_t* __restrict pixels = pixels_.data() + begin;
-    const int count = end - begin;
-    for (int i = 0; i < count; ++i) {
-      const int difference = sample.grey - partners[i];
-      differences[i] += difference;
-      squares[i] += difference * difference;
-      pixels[i] += 1;
-    }
-    if (right_foreground.empty()) continue;
-    const std::uint8_t* __restrict moving = right_foreground.row(y) + (column + begin);
-    std::int32_t* __restrict foreground = foreground_.data() + begin;
-    for (int i = 0; i < count; ++i) foreground[i] += moving[i] != 0 ? 1 : 0;
-  }
+  // Lane i is disparity range.max - i: right columns then rise with i.
+  region_sums({.samples = samples_.first(static_cast<std::size_t>(sample_size_)),
+               .right = right,
+               .moving = right_foreground,
+               .shift = -config_.offset - range.max,
+               .row_offset = row_offset,
+               .lanes = lanes},
+              sums_);
   for (int i = 0; i < lanes; ++i) {
-    const int n = pixels_[i];
+    const auto lane = static_cast<std::size_t>(i);
+    const int n = sums_.pixels[lane];
     double& score = scores[lanes - 1 - i];
     double& share = shares[lanes - 1 - i];
     score = kNoScore;
     share = 0;
     if (n == 0 || 2 * n < sample_size_) continue;
-    const std::int64_t sum = differences_[i];
-    const std::int64_t spread = std::int64_t{squares_[i]} * n - sum * sum;
+    const std::int64_t sum = sums_.differences[lane];
+    const std::int64_t spread = std::int64_t{sums_.squares[lane]} * n - sum * sum;
     const double variance = static_cast<double>(spread) / (static_cast<double>(n) * n);
     const double bias = static_cast<double>(std::abs(sum)) / n;
     const double excess = std::max(0.0, bias - config_.bias_tolerance);
-    share = right_foreground.empty() ? 1.0 : static_cast<double>(foreground_[i]) / n;
+    share = right_foreground.empty() ? 1.0 : static_cast<double>(sums_.moving[lane]) / n;
     const double saturation = config_.saturation * config_.saturation;
     const double penalty = config_.foreground_penalty * config_.foreground_penalty;
     const double appearance = variance + excess * excess;
@@ -127,8 +106,9 @@ RegionMatch RegionMatcher::best_match(ImageView<const std::uint8_t> right, Dispa
   if (best < 0) return {};
 
   const double floor = config_.noise * config_.noise;
-  const auto [leftmost, rightmost] = std::minmax_element(samples_.begin(), samples_.begin() + sample_size_,
-                                                         [](const Sample& a, const Sample& b) { return a.x < b.x; });
+  const auto [leftmost, rightmost] =
+      std::minmax_element(samples_.begin(), samples_.begin() + sample_size_,
+                          [](const RegionSample& a, const RegionSample& b) { return a.x < b.x; });
   const int width = rightmost->x - leftmost->x + 1;
   const int apart = std::max(2, width / 2);
   double rival = kNoScore;

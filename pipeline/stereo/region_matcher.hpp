@@ -6,6 +6,7 @@
 
 #include "pipeline/core/arena.hpp"
 #include "pipeline/stereo/disparity.hpp"
+#include "pipeline/stereo/region_kernel.hpp"
 
 namespace stereotrack {
 
@@ -64,6 +65,8 @@ class RegionMatcher {
     double sigma_floor_px = 0.2;     ///< 0.01..10 [px]
   };
 
+  [[nodiscard]] const Config& config() const noexcept { return config_; }
+
   [[nodiscard]] static Result<RegionMatcher> create(const Config& config, Arena& arena) noexcept;
 
   template <class Label>
@@ -79,12 +82,6 @@ class RegionMatcher {
   }
 
  private:
-  struct Sample {
-    std::int16_t x;
-    std::int16_t y;
-    std::int16_t grey;
-  };
-
   RegionMatcher() noexcept = default;
 
   /// Every step-th pixel of every step-th row; false if they are more than the sample holds.
@@ -113,13 +110,10 @@ class RegionMatcher {
 
   Config config_;
   int sample_size_ = 0;
-  std::span<Sample> samples_;
-  std::span<std::int32_t> differences_;  ///< sums of e, [candidate], largest disparity first
-  std::span<std::int32_t> squares_;      ///< sums of e^2
-  std::span<std::int32_t> foreground_;   ///< pixels on right foreground
-  std::span<std::int32_t> pixels_;       ///< n
-  std::span<double> scores_;             ///< E, [row offset][d - range.min]; kNoScore where no candidate exists
-  std::span<double> shares_;             ///< share, likewise
+  std::span<RegionSample> samples_;
+  RegionSums sums_;           ///< [candidate], largest disparity first
+  std::span<double> scores_;  ///< E, [row offset][d - range.min]; kNoScore where no candidate exists
+  std::span<double> shares_;  ///< share, likewise
 };
 
 }  // namespace stereotrack

@@ -59,7 +59,14 @@ class Appearance {
   }
 
  private:
-  static constexpr int chroma_bin(std::uint8_t c) noexcept { return std::clamp((c - 74) / 12, 0, 7); }
+  static constexpr std::array<std::uint8_t, 256> kChromaBins = [] {
+    std::array<std::uint8_t, 256> bins{};
+    for (int c = 0; c < 256; ++c) {
+      bins[static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(std::clamp((c - 74) / 12, 0, 7));
+    }
+    return bins;
+  }();
+  static constexpr int chroma_bin(std::uint8_t c) noexcept { return kChromaBins[c]; }
 
   std::array<float, kBins> share_{};
   float total_ = 0;

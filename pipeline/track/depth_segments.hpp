@@ -22,7 +22,8 @@ namespace stereotrack {
 /// A blob without any disparity is one segment without depth.
 ///
 /// disparity in 1/16 px, kNoDisparity where unknown, same picture as labels. Two sweeps over the blob's box in each
-/// direction (exact for convex blobs, near enough for others). One instance a thread. O(box).
+/// direction (exact for convex blobs, near enough for others), of which
+/// each unknown pixel is visited. One instance a thread. O(box).
 class DepthSegments {
  public:
   static constexpr int kMost = 32;
@@ -57,14 +58,16 @@ class DepthSegments {
     std::uint16_t x, y;
   };
 
-  void spread(const Input& in, const Blob& blob, ImageView<std::uint16_t> value) noexcept;
+  template <class Known>
+  [[nodiscard]] std::size_t start_spread(const Input& in, const Blob& blob, Known&& known) noexcept;
+  void spread(ImageView<const std::uint8_t> luma, std::size_t count, ImageView<std::uint16_t> value) noexcept;
   int flood(const Input& in, const Blob& blob, int least) noexcept;
 
   Config config_;
   ImageView<std::uint16_t> filled_;
-  ImageView<std::uint16_t> segment_;
-  ImageView<std::uint16_t> cost_;
-  std::span<Place> queue_;
+  ImageView<std::uint16_t> segment_;  // one pixel of frame around it, so that neighbours need no test
+  ImageView<std::uint16_t> cost_;     // likewise
+  std::span<Place> places_;
 };
 
 }  // namespace stereotrack

@@ -253,17 +253,21 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
   candidate.valid = 0;
   candidate.has_depth = false;
   if (in.disparity.empty()) return;
-  std::fill(histogram_.begin(), histogram_.end(), 0U);
+  std::size_t first = kBins;
+  std::size_t last = 0;
   for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
     const std::uint16_t d = in.disparity.at(x, y);
     if (d == kNoDisparity) return;
-    ++histogram_[d / kBin];
+    const std::size_t at = d / kBin;
+    ++histogram_[at];
+    first = std::min(first, at);
+    last = std::max(last, at);
     ++candidate.valid;
   });
   if (candidate.valid == 0) return;
   const auto half = static_cast<std::uint32_t>((candidate.valid + 1) / 2);
   std::uint32_t below = 0;
-  std::size_t bin = 0;
+  std::size_t bin = first;
   while (below + histogram_[bin] < half) below += histogram_[bin++];
   // Linear inside the bin.
   candidate.disparity =
@@ -285,6 +289,8 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
     if (bin + reach < kBins) inside += histogram_[bin + reach];
   }
   candidate.reach = (static_cast<double>(reach) + 0.25) * kBin / kDisparityScale;
+  std::fill(histogram_.begin() + static_cast<std::ptrdiff_t>(first),
+            histogram_.begin() + static_cast<std::ptrdiff_t>(last) + 1, 0U);
   // A block's disparities hang together: about one independent value every 5 x 5 pixels.
   const double independent = std::max(candidate.valid / 25.0, 1.0);
   candidate.disparity_sd = std::sqrt(square(kLeastDisparitySd) + square(1.5 * candidate.scatter) / independent);
@@ -322,10 +328,8 @@ int Detector::claim_of(const Input& in, const Candidate& candidate) const noexce
     if (!target.confirmed) continue;
     const int slack =
         static_cast<int>(std::min(target.image_sd, 0.25 * std::max(target.box.width, target.box.height)) + 1.5);
-    const Rect reach{target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack,
-                     target.box.height + 2 * slack};
-    const double inside =
-        static_cast<double>(intersect(reach, candidate.box).area()) / static_cast<double>(candidate.box.area());
+    const double inside = static_cast<double>(intersect(grown(target.box, slack), candidate.box).area()) /
+                          static_cast<double>(candidate.box.area());
     if (inside <= 0.5) continue;
     if (!resembles(target, candidate)) continue;
     const double likeness = target.appearance == nullptr ? 1.0 : target.appearance->explains(candidate.appearance);

@@ -152,7 +152,7 @@ class Detector {
   RejectionCounts rejections_{};
   BoundedVector<Candidate> candidates_;
   BoundedVector<Detection> detections_;
-  std::span<std::uint32_t> histogram_;
+  std::span<std::uint32_t> histogram_;  ///< of one candidate while it is measured, else all 0
   FixedVector<Layer, 8> layers_;
   ImageView<std::uint16_t> choice_;
 };

@@ -9,14 +9,12 @@ namespace stereotrack {
 
 namespace {
 
-constexpr int kReach = Features::kPatch / 2;
-constexpr int kTensorReach = 2;
-constexpr int kArea = Features::kPatch * Features::kPatch;
+constexpr int kReach = kPatchReach;
+constexpr int kArea = kPatchArea;
 // Where a patch was found to about this many pixels.
 constexpr double kSearchNoise = 0.4;
 
 using Vector = ConstantVelocityFilter<2>::Vector;
-using Patch = std::array<std::uint8_t, kArea>;
 
 bool patch_fits(ImageView<const std::uint8_t> luma, int x, int y) noexcept {
   return x >= kReach && y >= kReach && x + kReach < luma.width && y + kReach < luma.height;
@@ -26,24 +24,6 @@ void cut(ImageView<const std::uint8_t> luma, int x, int y, Patch& patch) noexcep
   for (int v = 0; v < Features::kPatch; ++v) {
     std::copy_n(luma.row(y - kReach + v) + x - kReach, Features::kPatch, patch.begin() + v * Features::kPatch);
   }
-}
-
-// Sum of |(a - mean a) - (b - mean b)|, times kArea so that the means stay integers.
-int zero_mean_difference(const Patch& patch, int patch_sum, ImageView<const std::uint8_t> luma, int x, int y) noexcept {
-  int sum = 0;
-  for (int v = -kReach; v <= kReach; ++v) {
-    const std::uint8_t* row = luma.row(y + v) + x;
-    for (int u = -kReach; u <= kReach; ++u) sum += row[u];
-  }
-  const int shift = patch_sum - sum;
-  int difference = 0;
-  for (int v = 0; v < Features::kPatch; ++v) {
-    const std::uint8_t* row = luma.row(y - kReach + v) + x - kReach;
-    for (int u = 0; u < Features::kPatch; ++u) {
-      difference += std::abs((patch[static_cast<std::size_t>(v * Features::kPatch + u)] - row[u]) * kArea - shift);
-    }
-  }
-  return difference / kArea;
 }
 
 // From the whole pixel (x, y), where the patch fits best, to where it fits best between the pixels; at most one pixel.
@@ -83,6 +63,15 @@ Vector sub_pixel(const Patch& patch, ImageView<const std::uint8_t> luma, int x, 
   return step.cwiseMax(-1).cwiseMin(1);
 }
 
+// Per pixel of the window.
+double smaller_eigenvalue(const Tensor& tensor) noexcept {
+  const auto sum = static_cast<double>(tensor.a + tensor.c);
+  const auto apart = static_cast<double>(tensor.a - tensor.c);
+  const auto mixed = static_cast<double>(2 * tensor.b);
+  constexpr double kWindow = (2 * kTensorReach + 1) * (2 * kTensorReach + 1);
+  return 0.5 * (sum - std::sqrt(apart * apart + mixed * mixed)) / kWindow;
+}
+
 }  // namespace
 
 Result<Features> Features::create(const Config& config, int width, int height, Arena& arena) noexcept {
@@ -98,25 +87,10 @@ Result<Features> Features::create(const Config& config, int width, int height, A
 double Features::corner_strength(ImageView<const std::uint8_t> luma, int x, int y) noexcept {
   constexpr int kEdge = kTensorReach + 1;
   if (x < kEdge || y < kEdge || x + kEdge >= luma.width || y + kEdge >= luma.height) return 0;
-  std::int64_t a = 0;
-  std::int64_t b = 0;
-  std::int64_t c = 0;
-  for (int v = y - kTensorReach; v <= y + kTensorReach; ++v) {
-    for (int u = x - kTensorReach; u <= x + kTensorReach; ++u) {
-      const int gx = luma.at(u + 1, v) - luma.at(u - 1, v);
-      const int gy = luma.at(u, v + 1) - luma.at(u, v - 1);
-      a += gx * gx;
-      b += gx * gy;
-      c += gy * gy;
-    }
-  }
-  const auto sum = static_cast<double>(a + c);
-  const auto apart = static_cast<double>(a - c);
-  const auto mixed = static_cast<double>(2 * b);
-  constexpr double kWindow = (2 * kTensorReach + 1) * (2 * kTensorReach + 1);
-  return 0.5 * (sum - std::sqrt(apart * apart + mixed * mixed)) / kWindow;
+  Tensor tensor;
+  tensors(luma, x, y, 1, &tensor);
+  return smaller_eigenvalue(tensor);
 }
-
 void Features::follow(ImageView<const std::uint8_t> luma, double dt, double acceleration_sd, Set& set) const noexcept {
   const ConstantVelocityFilter<2>::Matrix R =
       ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
@@ -134,20 +108,19 @@ void Features::follow(ImageView<const std::uint8_t> luma, double dt, double acce
     const int reach_y = reach(S(1, 1));
     const int x0 = static_cast<int>(std::floor(expected.x() + 0.5));
     const int y0 = static_cast<int>(std::floor(expected.y() + 0.5));
-    int patch_sum = 0;
-    for (const std::uint8_t value : feature.patch) patch_sum += value;
     int best = std::numeric_limits<int>::max();
     int best_x = 0;
     int best_y = 0;
-    for (int y = y0 - reach_y; y <= y0 + reach_y; ++y) {
-      for (int x = x0 - reach_x; x <= x0 + reach_x; ++x) {
-        if (!patch_fits(luma, x, y)) continue;
-        const int cost = zero_mean_difference(feature.patch, patch_sum, luma, x, y);
-        if (cost < best) {
-          best = cost;
-          best_x = x;
-          best_y = y;
-        }
+    const Rect window = intersect({x0 - reach_x, y0 - reach_y, 2 * reach_x + 1, 2 * reach_y + 1},
+                                  grown({0, 0, luma.width, luma.height}, -kReach));
+    std::array<std::int32_t, kMostPlaces> costs;
+    for (int y = window.top; y < window.bottom(); ++y) {
+      patch_costs(feature.patch, luma, window.left, y, window.width, costs.data());
+      for (int i = 0; i < window.width; ++i) {
+        if (costs[static_cast<std::size_t>(i)] >= best) continue;
+        best = costs[static_cast<std::size_t>(i)];
+        best_x = window.left + i;
+        best_y = y;
       }
     }
     if (best > config_.most_difference * kArea) continue;
@@ -170,10 +143,18 @@ void Features::refill(ImageView<const std::uint8_t> luma, ImageView<const std::u
                       Set& set) noexcept {
   const Rect inside = intersect(box, {0, 0, luma.width, luma.height});
   if (inside.empty() || set.size() == Set::capacity()) return;
-  for (int y = inside.top; y < inside.bottom(); ++y) {
-    for (int x = inside.left; x < inside.right(); ++x) {
-      strength_.at(x, y) =
-          labels.at(x, y) == label && patch_fits(luma, x, y) ? static_cast<float>(corner_strength(luma, x, y)) : 0.0F;
+  static_assert(kReach > kTensorReach, "where a patch fits, a tensor does, too");
+  for (int y = inside.top; y < inside.bottom(); ++y) std::fill_n(&strength_.at(inside.left, y), inside.width, 0.0F);
+  const Rect fitting = intersect(inside, grown({0, 0, luma.width, luma.height}, -kReach));
+  std::array<Tensor, kMostTensors> row;
+  for (int y = fitting.top; y < fitting.bottom(); ++y) {
+    for (int left = fitting.left; left < fitting.right(); left += kMostTensors) {
+      const int count = std::min(fitting.right() - left, kMostTensors);
+      tensors(luma, left, y, count, row.data());
+      for (int i = 0; i < count; ++i) {
+        if (labels.at(left + i, y) != label) continue;
+        strength_.at(left + i, y) = static_cast<float>(smaller_eigenvalue(row[static_cast<std::size_t>(i)]));
+      }
     }
   }
   const auto clear_around = [&](double px, double py) {

@@ -9,6 +9,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/track/features_kernel.hpp"
 #include "pipeline/track/kalman.hpp"
 
 namespace stereotrack {
@@ -27,8 +28,8 @@ namespace stereotrack {
 /// most_difference: each cut adds the sub-pixel's error to the path.
 class Features {
  public:
-  static constexpr int kPatch = 9;  ///< side of a patch [px]
-  static constexpr int kMost = 12;  ///< features a target
+  static constexpr int kPatch = kPatchSide;  ///< side of a patch [px]
+  static constexpr int kMost = 12;           ///< features a target
 
   struct Config {
     int corner_quality = 400;  ///< smallest eigenvalue of a corner [grey levels^2 per pixel of gradient], 1..1e6
@@ -38,7 +39,7 @@ class Features {
 
   struct Feature {
     ConstantVelocityFilter<2> filter;  ///< raw left picture [px, px/s]
-    std::array<std::uint8_t, kPatch * kPatch> patch{};
+    Patch patch{};
     /// From the patch's centre, a whole pixel, to the feature; at most half a pixel each way.
     ConstantVelocityFilter<2>::Vector offset = ConstantVelocityFilter<2>::Vector::Zero();
     ConstantVelocityFilter<2>::Vector moved =

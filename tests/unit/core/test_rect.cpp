@@ -34,5 +34,10 @@ TEST(Rect, OverlapIsIntersectionOverUnion) {
   EXPECT_DOUBLE_EQ(overlap({}, {}), 0.0);
 }
 
+TEST(Rect, GrownKeepsItsMiddle) {
+  EXPECT_EQ(grown({10, 20, 3, 4}, 5), (Rect{5, 15, 13, 14}));
+  EXPECT_EQ(grown({10, 20, 3, 4}, 0), (Rect{10, 20, 3, 4}));
+}
+
 }  // namespace
 }  // namespace stereotrack

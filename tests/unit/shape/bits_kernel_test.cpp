@@ -38,5 +38,27 @@ TEST(BitsKernel, EveryWidthIsTheDefinitionOnEachTarget) {
   }
 }
 
+TEST(BitsKernel, RunsAreThoseOfThePixels) {
+  std::mt19937 engine(4);
+  for (const int width : {0, 1, 63, 64, 65, 128, 640, 2048, 2049, 5000}) {
+    for (const unsigned gaps : {2U, 9U, 1000U}) {
+      std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width) + 1, 1);  // one after the row's end
+      for (int x = 0; x < width; ++x) pixels[static_cast<std::size_t>(x)] = engine() % gaps == 0 ? 0 : 9;
+      test::on_each_target([&] {
+        std::vector<std::uint8_t> painted(pixels.size(), 0);
+        painted.back() = 1;
+        int last = -1;
+        for_each_set_run(pixels.data(), width, [&](int begin, int end) {
+          EXPECT_GT(begin, last);
+          EXPECT_LT(begin, end);
+          last = end;
+          for (int x = begin; x < end; ++x) painted[static_cast<std::size_t>(x)] = pixels[static_cast<std::size_t>(x)];
+        });
+        EXPECT_EQ(painted, pixels) << width;
+      });
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stereotrack
