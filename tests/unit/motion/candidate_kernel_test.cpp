@@ -87,7 +87,7 @@ TEST(CandidateKernel, ExtremeLimitsAreTheReference) {
 // Pixels that just are, and just are not, candidates: the definition worked by hand.
 TEST(CandidateKernel, LimitsAreInclusive) {
   on_each_target([] {
-    const auto centre = [](Plane distance, const CandidateLimits& limits) {
+    const auto centre = [](const Plane& distance, const CandidateLimits& limits) {
       return masks_of(distance, limits, mark_candidates, keep_majority).candidates(5, 50);
     };
     Plane distance(11, 101, std::uint8_t{0});

@@ -173,6 +173,7 @@ TEST_P(SyntheticFoliageSeeds, LeavesFlicker) {
     if (x >= 0 && y >= 0 && x < 160 && y < 45) leaves.push_back(deviation(static_cast<std::size_t>(y * 160 + x)));
   }
   std::vector<double> floor;
+  floor.reserve(100);
   for (int x = 0; x < 100; ++x) floor.push_back(deviation(static_cast<std::size_t>(112 * 160 + x + 30)));
   ASSERT_GT(leaves.size(), 10U);
   EXPECT_GT(middle(leaves), 2.0 * middle(floor));
