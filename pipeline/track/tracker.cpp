@@ -267,6 +267,15 @@ void Tracker::associate(std::span<const Detection> detections, bool confirmed) n
       [this](Target& target, const Detection& detection, std::uint16_t label) { measure(target, detection, label); });
 }
 
+// Whether it was measured where the target cannot be.
+bool Tracker::is_at_other_depth(const Target& target, const Detection& detection) const noexcept {
+  const double z = target.space.position().z();
+  if (!target.has_depth || !sees_depth(target, detection) || !(z > 0)) return false;
+  const double expected = view_.focal_baseline / z;
+  const double sd = expected / z * std::sqrt(target.space.position_covariance()(2, 2));
+  return std::abs(detection.disparity - expected) > 3 * (sd + detection.disparity_sd) + kRecoverDepth * expected;
+}
+
 // A target that turned at once, or comes out from behind something, is where its motion did not lead: near where it was
 // last seen, at its depth, of its size, and it looks the same.
 double Tracker::recovery_cost(const Target& target, const Detection& detection) const noexcept {
@@ -275,14 +284,7 @@ double Tracker::recovery_cost(const Target& target, const Detection& detection) 
   if (part > kRecoverArea || part * kRecoverArea < 1) return Assignment::kForbidden;
   const double strange = 1 - target.appearance.explains(detection.appearance, part);
   if (strange > kRecoverStrange) return Assignment::kForbidden;
-  const double z = target.space.position().z();
-  if (target.has_depth && sees_depth(target, detection) && z > 0) {
-    const double expected = view_.focal_baseline / z;
-    const double sd = expected / z * std::sqrt(target.space.position_covariance()(2, 2));
-    if (std::abs(detection.disparity - expected) > 3 * (sd + detection.disparity_sd) + kRecoverDepth * expected) {
-      return Assignment::kForbidden;
-    }
-  }
+  if (is_at_other_depth(target, detection)) return Assignment::kForbidden;
   const double step =
       std::sqrt(square(detection.centre_x() - target.last_x) + square(detection.centre_y() - target.last_y));
   const double reach = kRecoverReach * std::max(target.width, target.height) +
@@ -336,7 +338,9 @@ void Tracker::take_over(std::span<const Detection> detections) noexcept {
       if (child.parent != target.id || child.state != TrackState::kTentative || !child.measured) continue;
       const auto common = static_cast<double>(intersect(child.box, target.box).area());
       if (common < kInPlacePart * static_cast<double>(std::min(child.box.area(), target.box.area()))) continue;
-      if (is_leaving(target) && !is_large(child.box)) continue;
+      // What is not large has one depth: a part at another is something else, which passes before or behind.
+      const bool other = is_leaving(target) || is_at_other_depth(target, detections[child.label - 1U]);
+      if (other && !is_large(child.box)) continue;
       if (heir == nullptr || child.area > heir->area) heir = &child;
     }
     if (heir == nullptr) continue;

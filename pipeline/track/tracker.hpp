@@ -150,6 +150,7 @@ class Tracker {
   [[nodiscard]] bool sees_depth(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] Eigen::Vector2d centre(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double cost(const Target& target, const Detection& detection) const noexcept;
+  [[nodiscard]] bool is_at_other_depth(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double recovery_cost(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double overlap_cost(const Target& target, const Detection& detection) const noexcept;
   template <class Wanted, class Cost, class Take>

@@ -479,21 +479,26 @@ TEST_F(TrackerOf, TargetThatLosesItsDetectionTakesOverThePartInItsPlace) {
   struct Case {
     const char* what;
     Rect part;
+    double disparity;
     std::uint32_t id;
   };
-  // A leg is seen, then the body above it that hides it: at another depth, of another size.
-  for (const Case& one : {Case{"over it", {190, 120, 120, 100}, 1}, Case{"beside it", {280, 120, 120, 100}, 2}}) {
+  // A leg is seen, then the body above it that hides it: of another size, and at another depth where it is large. What
+  // is not large and at another depth passes before the leg.
+  for (const Case& one : {Case{"over it, large", {190, 120, 240, 140}, 32, 1},
+                          Case{"over it, at its depth", {190, 120, 120, 100}, 16, 1},
+                          Case{"over it, small, nearer", {190, 120, 120, 100}, 32, 2},
+                          Case{"beside it", {280, 120, 120, 100}, 16, 2}}) {
     make(config());
     const auto leg = [](int k) { return part_of(1, painted(box_at({100 + 8 * k, 160, 24, 60}, 16), kBlue)); };
     const auto body = [&](int k) {
       const Rect box{one.part.left + 8 * (k - 12), one.part.top, one.part.width, one.part.height};
-      return part_of(1, painted(box_at(box, 32), kRed));
+      return part_of(1, painted(box_at(box, one.disparity), kRed));
     };
     for (int k = 0; k < 12; ++k) step({leg(k)});
     for (int k = 12; k < 14; ++k) step({leg(k), body(k)});
     ASSERT_EQ(reports().size(), 2U) << one.what;
     step({body(14)});
-    const TrackReport seen = at(one.part.left + 16 + 60, one.part.top + 50);
+    const TrackReport seen = at(one.part.left + 16 + one.part.width / 2.0, one.part.top + one.part.height / 2.0);
     EXPECT_TRUE(seen.measured) << one.what;
     EXPECT_EQ(seen.id, one.id) << one.what;
     EXPECT_EQ(reports().size(), one.id) << one.what;
