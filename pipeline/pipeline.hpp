@@ -8,6 +8,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/frame.hpp"
 #include "pipeline/geometry/lazy_canvas.hpp"
 #include "pipeline/geometry/rectify.hpp"
@@ -180,5 +181,6 @@ class Pipeline {
   std::optional<Detector> detector_;
   std::optional<Tracker> tracker_;
 };
+static_assert(RealTimeStage<Pipeline, &Pipeline::run>);
 
 }  // namespace stereotrack
