@@ -12,6 +12,7 @@
 #include "pipeline/frame.hpp"
 #include "pipeline/geometry/lazy_canvas.hpp"
 #include "pipeline/geometry/rectify.hpp"
+#include "pipeline/memory_use.hpp"
 #include "pipeline/motion/mean_background.hpp"
 #include "pipeline/pipeline_config.hpp"
 #include "pipeline/shape/contour_fill.hpp"
@@ -80,6 +81,9 @@ class Pipeline {
   /// Null for mono.
   [[nodiscard]] const Rectifier* rectifier() const noexcept { return rectifier_ ? &*rectifier_ : nullptr; }
 
+  /// What create() took from the arena; nothing is added later.
+  [[nodiscard]] const MemoryUse& memory() const noexcept { return memory_; }
+
  private:
   /// One view's planes, raw size.
   struct Planes {
@@ -132,6 +136,7 @@ class Pipeline {
 
   PipelineConfig config_;
   Setup setup_;
+  MemoryUse memory_;
   bool started_ = false;
   bool light_change_ = false;
   int frames_ = 0;
