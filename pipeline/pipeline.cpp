@@ -91,6 +91,7 @@ bool keep(std::optional<T>& stage, const Result<T>& made, Result<void>& outcome)
 Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& setup, Arena& arena) noexcept {
   if (setup.width < 16 || setup.height < 16 || setup.width > 8192 || setup.height > 8192) return fail(Fault::kBadSize);
   Pipeline self(config, setup);
+  self.memory_ = MemoryUse(arena);
   const auto planes = [&](Planes& view, bool colour) {
     for (ImageView<std::uint8_t>* plane : {&view.y, &view.smooth_y, &view.distance, &view.mask}) {
       *plane = arena.image<std::uint8_t>(setup.width, setup.height);
@@ -105,11 +106,12 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   self.typical_distance_ = arena.array<std::uint8_t>(static_cast<std::size_t>(config.shape.max_blobs) + 1);
   self.ghost_ = arena.array<std::uint8_t>(static_cast<std::size_t>(config.shape.max_blobs) + 1);
   self.moving_ = arena.image<std::uint8_t>(setup.width, setup.height);
+  if (setup.calibration != nullptr) planes(self.right_, false);
+  self.memory_.charge(MemoryPart::kPlanes, arena);
   self.equalise_left_ = Equalise({config.equalise});
   self.equalise_right_ = Equalise({config.equalise});
   if (const Result<void> made = self.create_foreground(arena); !made) return fail(made.error());
   if (setup.calibration != nullptr) {
-    planes(self.right_, false);
     if (const Result<void> made = self.create_stereo(arena); !made) return fail(made.error());
   }
   Result<void> outcome;
@@ -118,9 +120,14 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
     view.focal = self.rectifier_->geometry().f;
     view.focal_baseline = view.focal * self.rectifier_->geometry().baseline;
   }
-  const bool all = keep(self.detector_, Detector::create(config.objects, setup.width, setup.height, arena), outcome) &&
-                   keep(self.tracker_, Tracker::create(config.track, config.features, view, arena), outcome);
-  if (!all) return fail(outcome.error());
+  if (!keep(self.detector_, Detector::create(config.objects, setup.width, setup.height, arena), outcome)) {
+    return fail(outcome.error());
+  }
+  self.memory_.charge(MemoryPart::kDetector, arena);
+  if (!keep(self.tracker_, Tracker::create(config.track, config.features, view, arena), outcome)) {
+    return fail(outcome.error());
+  }
+  self.memory_.charge(MemoryPart::kTracker, arena);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
 }
@@ -136,15 +143,20 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
     const auto mean = [&] { return MeanBackground::create(background.frames, width, height, arena); };
     if (!keep(mean_y_, mean(), outcome)) return outcome;
     if (setup_.colour && !(keep(mean_cb_, mean(), outcome) && keep(mean_cr_, mean(), outcome))) return outcome;
+    memory_.charge(MemoryPart::kBackground, arena);
     if (!keep(sobel_, Sobel::create({}, width, height, arena), outcome)) return outcome;
   } else {
     if (!keep(background_left_, AdaptiveBackground::create(background.adaptive, width, height, setup_.colour, arena),
-              outcome) ||
-        !keep(foreground_left_, ForegroundMask::create(config_.foreground, width, height, arena), outcome) ||
+              outcome)) {
+      return outcome;
+    }
+    memory_.charge(MemoryPart::kBackground, arena);
+    if (!keep(foreground_left_, ForegroundMask::create(config_.foreground, width, height, arena), outcome) ||
         !keep(closing_, Closing::create({.repeats = shape.closing}, width, height, arena), outcome)) {
       return outcome;
     }
   }
+  memory_.charge(MemoryPart::kForeground, arena);
   const std::int64_t hole = edges ? ContourFill::kUnlimited : shape.hole_px;
   if (!keep(contour_fill_, ContourFill::create({.max_hole_px = hole}, width, height, arena), outcome) ||
       !keep(opening_, Opening::create({.repeats = shape.opening}, width, height, arena), outcome) ||
@@ -152,13 +164,16 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
           blob_extractor_,
           BlobExtractor::create({.max_runs = kMaxRuns, .max_blobs = shape.max_blobs, .min_area_px = shape.min_blob_px},
                                 width, height, arena),
-          outcome) ||
-      !keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, arena), outcome)) {
+          outcome)) {
     return outcome;
   }
+  memory_.charge(MemoryPart::kShapes, arena);
+  if (!keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, arena), outcome)) return outcome;
+  memory_.charge(MemoryPart::kShadow, arena);
   if (shape.level_set) {
     (void)(keep(level_set_, LevelSet::create(shape.level_set_config, width, height, arena), outcome) &&
            keep(convex_hull_, ConvexHull::create({}, width, height, arena), outcome));
+    memory_.charge(MemoryPart::kLevelSet, arena);
   }
   return outcome;
 }
@@ -168,6 +183,7 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
   const int height = setup_.height;
   Result<void> outcome;
   if (!keep(rectifier_, Rectifier::create(*setup_.calibration, width, height, arena), outcome)) return outcome;
+  memory_.charge(MemoryPart::kRectifier, arena);
   const RectifiedGeometry& canvas = rectifier_->geometry();
   const DisparityConfig& disparity = config_.disparity;
   full_range_ = std::max(static_cast<int>(disparity.reach * width + 0.5), disparity.max);
@@ -198,6 +214,7 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
                    outcome)) {
     return outcome;
   }
+  memory_.charge(MemoryPart::kMatcher, arena);
   if (!keep(region_matcher_,
             RegionMatcher::create({.width = canvas.width_left,
                                    .height = canvas.height,
@@ -208,25 +225,35 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
             outcome)) {
     return outcome;
   }
-  if (config_.background.method == ForegroundMethod::kAdaptive) {
+  memory_.charge(MemoryPart::kRegions, arena);
+  const bool adaptive = config_.background.method == ForegroundMethod::kAdaptive;
+  if (adaptive) {
     if (!keep(background_right_, AdaptiveBackground::create(config_.background.adaptive, width, height, false, arena),
-              outcome) ||
-        !keep(foreground_right_, ForegroundMask::create(config_.foreground, width, height, arena), outcome)) {
+              outcome)) {
       return outcome;
     }
+    memory_.charge(MemoryPart::kBackground, arena);
+    if (!keep(foreground_right_, ForegroundMask::create(config_.foreground, width, height, arena), outcome)) {
+      return outcome;
+    }
+    memory_.charge(MemoryPart::kForeground, arena);
     left_.background_canvas = LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena);
     right_.background_canvas = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena);
     right_moving_ = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kNearest, arena);
+  }
+  left_.canvas = LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena);
+  right_.canvas = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena);
+  memory_.charge(MemoryPart::kCanvases, arena);
+  if (adaptive) {
     canvas_background_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
     if (!canvas_background_.empty()) fill(canvas_background_, {0, 0, canvas.width_left, canvas.height}, kNoDisparity);
     old_disparity_ = arena.image<std::uint16_t>(width, height);
   }
-  left_.canvas = LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena);
-  right_.canvas = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena);
   wanted_ = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
   canvas_labels_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
   canvas_disparity_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
   disparity_ = arena.image<std::uint16_t>(width, height);
+  memory_.charge(MemoryPart::kDisparity, arena);
   return outcome;
 }
 

@@ -8,9 +8,11 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/frame.hpp"
 #include "pipeline/geometry/lazy_canvas.hpp"
 #include "pipeline/geometry/rectify.hpp"
+#include "pipeline/memory_use.hpp"
 #include "pipeline/motion/mean_background.hpp"
 #include "pipeline/pipeline_config.hpp"
 #include "pipeline/shape/contour_fill.hpp"
@@ -79,6 +81,9 @@ class Pipeline {
   /// Null for mono.
   [[nodiscard]] const Rectifier* rectifier() const noexcept { return rectifier_ ? &*rectifier_ : nullptr; }
 
+  /// What create() took from the arena; nothing is added later.
+  [[nodiscard]] const MemoryUse& memory() const noexcept { return memory_; }
+
  private:
   /// One view's planes, raw size.
   struct Planes {
@@ -131,6 +136,7 @@ class Pipeline {
 
   PipelineConfig config_;
   Setup setup_;
+  MemoryUse memory_;
   bool started_ = false;
   bool light_change_ = false;
   int frames_ = 0;
@@ -180,5 +186,6 @@ class Pipeline {
   std::optional<Detector> detector_;
   std::optional<Tracker> tracker_;
 };
+static_assert(RealTimeStage<Pipeline, &Pipeline::run>);
 
 }  // namespace stereotrack

@@ -17,6 +17,7 @@
 namespace {
 
 thread_local std::uint64_t count = 0;
+thread_local std::uint64_t freed = 0;
 
 }  // namespace
 
@@ -28,6 +29,9 @@ void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t number, std::size_t size);
 void* __libc_realloc(void* old, std::size_t size);
 void* __libc_memalign(std::size_t alignment, std::size_t size);
+void* __libc_valloc(std::size_t size);
+void* __libc_pvalloc(std::size_t size);
+void __libc_free(void* memory);
 
 void* malloc(std::size_t size) {
   ++count;
@@ -56,6 +60,18 @@ int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
   *out = memory;
   return 0;
 }
+void* valloc(std::size_t size) {
+  ++count;
+  return __libc_valloc(size);
+}
+void* pvalloc(std::size_t size) {
+  ++count;
+  return __libc_pvalloc(size);
+}
+void free(void* memory) {
+  ++freed;
+  __libc_free(memory);
+}
 }
 
 #endif
@@ -63,6 +79,7 @@ int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
 namespace stereotrack {
 
 std::uint64_t allocations_of_this_thread() noexcept { return count; }
+std::uint64_t frees_of_this_thread() noexcept { return freed; }
 bool allocations_are_counted() noexcept { return STEREOTRACK_COUNTS_ALLOCATIONS == 1; }
 
 }  // namespace stereotrack

@@ -57,6 +57,9 @@ int run(int argc, char** argv) {
   replay_command->add_option("--pace", pace, "max: as fast as it goes; real: in real time, with telemetry over UDP")
       ->check(CLI::IsMember({"max", "real"}));
   replay_command->add_option("--frames", replay_frames, "A:B, ordinals from 1, both included");
+  bool check_config = false;
+  replay_command->add_flag("--check-config", check_config,
+                           "only checks configuration, calibration and source, and prints the memory by stage");
 
   stereotrack::MasksArguments masks;
   std::string masks_frames;
@@ -104,6 +107,7 @@ int run(int argc, char** argv) {
   if (*replay_command) {
     replay.real_time = pace == "real";
     if (!replay_frames.empty()) replay.frames = stereotrack::parse_frames(replay_frames);
+    if (check_config) return stereotrack::check_replay(replay, std::cout);
     return stereotrack::run_replay(replay, std::cout, std::cerr);
   }
   if (*masks_command) {

@@ -68,6 +68,18 @@ class Pacer {
   CaptureTime first_;
 };
 
+// Where telemetry goes. Throws telemetry::EndpointError.
+std::vector<telemetry::Endpoint> destinations_of(const config::Configuration& configuration) {
+  std::vector<telemetry::Endpoint> destinations;
+  for (const std::string& text : configuration.telemetry.destinations) {
+    destinations.push_back(telemetry::parse_endpoint(text));
+  }
+  if (destinations.empty()) {
+    destinations.push_back(telemetry::parse_endpoint("127.0.0.1:" + std::to_string(telemetry::kDefaultPort)));
+  }
+  return destinations;
+}
+
 // Everything that one replay carries from frame to frame.
 class Replay {
  public:
@@ -83,7 +95,7 @@ class Replay {
       make_output_folder(*arguments.out);
       file_ = std::make_unique<telemetry::FileSink>(fs::path(*arguments.out) / "telemetry.bin");
     }
-    if (arguments.real_time) open_senders();
+    if (arguments.real_time) udp_ = std::make_unique<telemetry::UdpSender>(destinations_of(rig_.configuration()));
     if (arguments.render) {
       renderer_ = render::make_renderer(*arguments.render, rig_.source->info(), pipeline_.rectifier(), rig_.unit_m);
     }
@@ -165,17 +177,6 @@ class Replay {
   }
 
  private:
-  void open_senders() {
-    std::vector<telemetry::Endpoint> destinations;
-    for (const std::string& text : rig_.configuration().telemetry.destinations) {
-      destinations.push_back(telemetry::parse_endpoint(text));
-    }
-    if (destinations.empty()) {
-      destinations.push_back(telemetry::parse_endpoint("127.0.0.1:" + std::to_string(telemetry::kDefaultPort)));
-    }
-    udp_ = std::make_unique<telemetry::UdpSender>(destinations);
-  }
-
   void skip(Progress& progress) {
     ++summary_.skipped;
     skipped_before_ = true;
@@ -265,6 +266,30 @@ int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream
   }
   replay.save();
   replay.print(out);
+  return 0;
+}
+
+int check_replay(const ReplayArguments& arguments, std::ostream& out) {
+  const Rig rig = open_rig(arguments.rig);
+  (void)destinations_of(rig.configuration());
+  Arena arena;
+  const Pipeline pipeline = make_pipeline(rig, arena);
+  const capture::SourceInfo& info = rig.source->info();
+  out << info.name << ": " << info.width << 'x' << info.height << ' '
+      << (info.format == PixelFormat::kGrey8 ? "grey" : "colour") << ' ' << (info.stereo ? "stereo" : "mono")
+      << ", preset " << rig.configuration().preset << ": configuration, calibration and source are fine\n";
+  const auto row = [&out](const char* name, const std::string& bytes) {
+    char line[64];
+    (void)std::snprintf(line, sizeof line, "%-10s %12s\n", name, bytes.c_str());
+    out << line;
+  };
+  row("memory", "bytes");
+  for (std::size_t i = 0; i < kMemoryParts; ++i) {
+    const auto part = static_cast<MemoryPart>(i);
+    row(to_string(part), std::to_string(pipeline.memory().bytes(part)));
+  }
+  row("total", std::to_string(pipeline.memory().total()));
+  out << "the arena took " << arena.capacity() << " bytes from the system and takes no more\n";
   return 0;
 }
 

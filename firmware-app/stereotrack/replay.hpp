@@ -23,6 +23,10 @@ struct ReplayArguments {
 /// and no video is left behind unless it was whole before; PNG pictures so far stay, each whole.
 int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream& messages);
 
+/// `stereotrack replay SOURCE ... --check-config`: opens and checks all that run_replay() would, makes the pipeline,
+/// and prints to `out` what memory it takes by part. No frame is read, no file written. Throws as run_replay().
+int check_replay(const ReplayArguments& arguments, std::ostream& out);
+
 /// `stereotrack masks SOURCE --out DIR`: foreground masks, one %06d.png a frame, 255 = object.
 struct MasksArguments {
   RigArguments rig;

@@ -62,6 +62,8 @@ class Arena {
   void seal() noexcept { sealed_ = true; }
   [[nodiscard]] bool failed() const noexcept { return failed_; }
   [[nodiscard]] std::size_t bytes_used() const noexcept { return used_; }
+  /// What was taken from the system for them: a header of kAlignment more a request.
+  [[nodiscard]] std::size_t capacity() const noexcept { return used_ + requests_ * kAlignment; }
 
  private:
   struct Block {
@@ -80,11 +82,13 @@ class Arena {
     }
     blocks_ = new (memory) Block{blocks_};
     used_ += bytes;
+    ++requests_;
     return static_cast<char*>(memory) + kAlignment;
   }
 
   Block* blocks_ = nullptr;
   std::size_t used_ = 0;
+  std::size_t requests_ = 0;
   bool sealed_ = false;
   bool failed_ = false;
 };

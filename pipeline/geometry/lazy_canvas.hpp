@@ -6,6 +6,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/geometry/remap_kernel.hpp"
 
 namespace stereotrack {
@@ -45,5 +46,6 @@ class LazyCanvas {
   ImageView<std::uint8_t> canvas_;
   std::span<Stretch> drawn_;
 };
+static_assert(RealTimeStage<LazyCanvas, &LazyCanvas::show, &LazyCanvas::with, &LazyCanvas::whole>);
 
 }  // namespace stereotrack

@@ -8,6 +8,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/geometry/calibration.hpp"
 #include "pipeline/geometry/camera.hpp"
 #include "pipeline/geometry/rectified_geometry.hpp"
@@ -133,5 +134,6 @@ class Rectifier {
   Map right_;
   ImageView<PointF> rectified_from_raw_;
 };
+static_assert(RealTimeStage<Rectifier, &Rectifier::rectify, &Rectifier::raw_from_ray>);
 
 }  // namespace stereotrack

@@ -6,6 +6,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -102,5 +103,7 @@ class AdaptiveBackground {
   std::span<std::uint8_t> range_;  // of one row
   std::span<std::uint16_t> bins_;  // of one row
 };
+static_assert(RealTimeStage<AdaptiveBackground, &AdaptiveBackground::distance, &AdaptiveBackground::learn,
+                            &AdaptiveBackground::restart>);
 
 }  // namespace stereotrack

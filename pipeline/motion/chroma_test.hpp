@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "pipeline/core/image_view.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/shape/bits_kernel.hpp"
 
 namespace stereotrack {
@@ -59,5 +60,6 @@ struct ChromaTest {
     return cleared;
   }
 };
+static_assert(RealTimeStage<ChromaTest, &ChromaTest::run>);
 
 }  // namespace stereotrack

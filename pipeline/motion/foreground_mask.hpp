@@ -6,6 +6,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/motion/candidate_kernel.hpp"
 #include "pipeline/shape/run_length.hpp"
 
@@ -50,5 +51,6 @@ class ForegroundMask {
   std::span<Run> runs_;
   std::span<std::int32_t> seeds_;  // by root run
 };
+static_assert(RealTimeStage<ForegroundMask, &ForegroundMask::run>);
 
 }  // namespace stereotrack

@@ -4,6 +4,7 @@
 
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -46,5 +47,6 @@ class GhostTest {
 
   [[nodiscard]] static Contour measure(const Input& in, const Rect& box, std::uint16_t label) noexcept;
 };
+static_assert(RealTimeStage<GhostTest, &GhostTest::measure>);
 
 }  // namespace stereotrack

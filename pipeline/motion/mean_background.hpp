@@ -6,6 +6,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -58,5 +59,6 @@ class MeanBackground {
   ImageView<std::int32_t> sum_;
   ImageView<std::uint8_t> mean_;
 };
+static_assert(RealTimeStage<MeanBackground, &MeanBackground::learn>);
 
 }  // namespace stereotrack

@@ -7,6 +7,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/motion/shadow_kernel.hpp"
 
 namespace stereotrack {
@@ -98,5 +99,6 @@ class ShadowTest {
   ImageView<std::int8_t> verdicts_;  // within zeros
   std::span<std::uint8_t> looks_;    // ShadowLook bits of one row, where it was looked at
 };
+static_assert(RealTimeStage<ShadowTest, &ShadowTest::run, &ShadowTest::count_resembling>);
 
 }  // namespace stereotrack

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "pipeline/core/image_view.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -65,5 +66,6 @@ class Equalise {
   bool has_table_ = false;
   Table table_{};
 };
+static_assert(RealTimeStage<Equalise, &Equalise::run>);
 
 }  // namespace stereotrack

@@ -7,6 +7,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/shape/run_length.hpp"
 
 namespace stereotrack {
@@ -77,5 +78,6 @@ class BlobExtractor {
   std::span<Blob> blobs_;
   ImageView<std::uint16_t> labels_;
 };
+static_assert(RealTimeStage<BlobExtractor, &BlobExtractor::run>);
 
 }  // namespace stereotrack

@@ -6,6 +6,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/shape/run_length.hpp"
 
 namespace stereotrack {
@@ -42,5 +43,6 @@ class ContourFill {
   std::span<std::int64_t> area_;       // by root run
   std::span<std::uint8_t> at_border_;  // by root run
 };
+static_assert(RealTimeStage<ContourFill, &ContourFill::run>);
 
 }  // namespace stereotrack

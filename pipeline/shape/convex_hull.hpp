@@ -9,6 +9,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -47,6 +48,7 @@ class ConvexHull {
   std::span<Point> points_;    // row extremes, or both hulls' vertices
   std::span<Point> vertices_;  // right side downwards, left side upwards
 };
+static_assert(RealTimeStage<ConvexHull, &ConvexHull::run, &ConvexHull::merge>);
 
 /// Calls fn(y, begin, end) for each row of the picture that the hull covers, columns [begin, end): the
 /// pixels whose centres lie in the hull or on its edge, exactly. O(rows x vertices).

@@ -8,6 +8,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/shape/blob_extractor.hpp"
 
 namespace stereotrack {
@@ -110,5 +111,6 @@ class LevelSet {
   std::span<std::int32_t> next_band_;
   std::int32_t next_size_ = 0;
 };
+static_assert(RealTimeStage<LevelSet, &LevelSet::run>);
 
 }  // namespace stereotrack

@@ -6,6 +6,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -49,6 +50,7 @@ class Opening : public Morphology3x3 {
   [[nodiscard]] static Result<Opening> create(const Config& config, int width, int height, Arena& arena) noexcept;
   [[nodiscard]] Result<void> run(ImageView<const std::uint8_t> in, ImageView<std::uint8_t> out) noexcept;
 };
+static_assert(RealTimeStage<Opening, &Opening::run>);
 
 /// The dual: closes gaps that a 3x3 square does not fit into.
 ///     A . B = (A (+) B) (-) B
@@ -58,5 +60,6 @@ class Closing : public Morphology3x3 {
   [[nodiscard]] static Result<Closing> create(const Config& config, int width, int height, Arena& arena) noexcept;
   [[nodiscard]] Result<void> run(ImageView<const std::uint8_t> in, ImageView<std::uint8_t> out) noexcept;
 };
+static_assert(RealTimeStage<Closing, &Closing::run>);
 
 }  // namespace stereotrack

@@ -5,6 +5,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -30,5 +31,6 @@ class Sobel {
   int width_ = 0;
   int height_ = 0;
 };
+static_assert(RealTimeStage<Sobel, &Sobel::run>);
 
 }  // namespace stereotrack

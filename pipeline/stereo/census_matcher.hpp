@@ -4,6 +4,7 @@
 #include <span>
 
 #include "pipeline/core/arena.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/stereo/census_kernel.hpp"
 #include "pipeline/stereo/disparity.hpp"
 #include "pipeline/stereo/disparity_filter.hpp"
@@ -74,5 +75,6 @@ class CensusMatcher {
   ImageView<std::uint16_t> raw_;
   DisparityFilter filter_;
 };
+static_assert(RealTimeStage<CensusMatcher, &CensusMatcher::run, &CensusMatcher::run_region>);
 
 }  // namespace stereotrack

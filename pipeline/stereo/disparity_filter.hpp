@@ -4,6 +4,7 @@
 #include <span>
 
 #include "pipeline/core/arena.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/stereo/disparity.hpp"
 
 namespace stereotrack {
@@ -59,5 +60,6 @@ class DisparityFilter {
   std::span<std::int32_t> parents_;  ///< [run] union-find
   std::span<std::int32_t> sizes_;    ///< of the island [px], at its root
 };
+static_assert(RealTimeStage<DisparityFilter, &DisparityFilter::run>);
 
 }  // namespace stereotrack

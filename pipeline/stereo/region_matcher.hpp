@@ -5,6 +5,7 @@
 #include <span>
 
 #include "pipeline/core/arena.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/stereo/disparity.hpp"
 #include "pipeline/stereo/region_kernel.hpp"
 
@@ -115,5 +116,6 @@ class RegionMatcher {
   std::span<double> scores_;  ///< E, [row offset][d - range.min]; kNoScore where no candidate exists
   std::span<double> shares_;  ///< share, likewise
 };
+static_assert(RealTimeStage<RegionMatcher, &RegionMatcher::run<std::uint8_t>, &RegionMatcher::run<std::uint16_t>>);
 
 }  // namespace stereotrack

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "pipeline/core/arena.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/stereo/disparity.hpp"
 #include "pipeline/stereo/sad_kernel.hpp"
 
@@ -57,5 +58,6 @@ class SadMatcher {
   SadScratch scratch_;
   std::span<Span> spans_;  ///< of the rows of the running call
 };
+static_assert(RealTimeStage<SadMatcher, &SadMatcher::run, &SadMatcher::run_region>);
 
 }  // namespace stereotrack

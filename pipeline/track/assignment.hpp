@@ -5,6 +5,7 @@
 
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 
 namespace stereotrack {
 
@@ -35,5 +36,6 @@ class Assignment {
   int max_rows_ = 0;
   int max_columns_ = 0;
 };
+static_assert(RealTimeStage<Assignment, &Assignment::solve>);
 
 }  // namespace stereotrack

@@ -7,6 +7,7 @@
 #include "pipeline/core/bounded_vector.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/shape/blob_extractor.hpp"
 
 namespace stereotrack {
@@ -69,5 +70,6 @@ class DepthSegments {
   ImageView<std::uint16_t> cost_;     // likewise
   std::span<Place> places_;
 };
+static_assert(RealTimeStage<DepthSegments, &DepthSegments::run>);
 
 }  // namespace stereotrack

@@ -8,6 +8,7 @@
 #include "pipeline/core/bounded_vector.hpp"
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/geometry/rectify.hpp"
 #include "pipeline/shape/blob_extractor.hpp"
 #include "pipeline/shape/convex_hull.hpp"
@@ -156,5 +157,6 @@ class Detector {
   FixedVector<Layer, 8> layers_;
   ImageView<std::uint16_t> choice_;
 };
+static_assert(RealTimeStage<Detector, &Detector::segment, &Detector::conclude>);
 
 }  // namespace stereotrack

@@ -9,6 +9,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/track/features_kernel.hpp"
 #include "pipeline/track/kalman.hpp"
 
@@ -67,5 +68,6 @@ class Features {
   Config config_;
   ImageView<float> strength_;
 };
+static_assert(RealTimeStage<Features, &Features::follow, &Features::refill>);
 
 }  // namespace stereotrack

@@ -7,6 +7,7 @@
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/bounded_vector.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/core/stage.hpp"
 #include "pipeline/track/assignment.hpp"
 #include "pipeline/track/detection.hpp"
 #include "pipeline/track/features.hpp"
@@ -203,5 +204,6 @@ class Tracker {
   Assignment assignment_;
   Features features_;
 };
+static_assert(RealTimeStage<Tracker, &Tracker::predict, &Tracker::update, &Tracker::reports>);
 
 }  // namespace stereotrack

@@ -97,6 +97,11 @@ def code_rules(name, text):
         for number, line in enumerate(code.splitlines(), 1):
             if re.search(r"\bvirtual\b", line):
                 yield number, "virtual", "no virtual inside the pipeline"
+    if name.parts[0] == "pipeline" and name.suffix == ".hpp":
+        for match in re.finditer(r"\bstatic Result<(\w+)>\s+create\([^;{]*\bArena&", code):
+            if not re.search(rf"\bstatic_assert\(RealTimeStage<{match.group(1)}\b", code):
+                yield code.count("\n", 0, match.start()) + 1, "stage", \
+                    f"want static_assert(RealTimeStage<{match.group(1)}, &...>) (pipeline/core/stage.hpp)"
     # What Highway compiles once for each instruction set has a guard of its own.
     if name.suffix == ".hpp" and "#pragma once" not in text and "defined(HWY_TARGET_TOGGLE)" not in text:
         yield 1, "guard", "a header without #pragma once"

@@ -75,6 +75,16 @@ class Refused(unittest.TestCase):
     def test_virtual_in_the_pipeline(self):
         self.refuses("virtual", {"pipeline/track/a.hpp": HEADER + "struct A { virtual void f(); };\n"})
 
+    def test_stage_whose_functions_nobody_checks(self):
+        stage = "struct A { static Result<A> create(int,\n Arena& arena) noexcept; void run() noexcept; };\n"
+        for text in [stage, stage + "// static_assert(RealTimeStage<A, &A::run>);\n",
+                     stage + "static_assert(RealTimeStage<AB, &AB::run>);\n"]:
+            with self.subTest(text=text):
+                self.refuses("stage", {"pipeline/track/a.hpp": HEADER + text})
+        self.assertFalse(check({"pipeline/track/a.hpp": HEADER + stage + "static_assert(RealTimeStage<A, &A::run>);\n",
+                                "pipeline/track/b.hpp": HEADER + "struct B { static Result<B> create(int a); };\n",
+                                "drivers/c.hpp": HEADER + stage}))
+
     def test_nolint_without_check_or_reason(self):
         for note in ["NOLINT", "NOLINTNEXTLINE", "NOLINT(misc-x)", "NOLINT: because of that", "NOLINTBEGIN(misc-x)",
                      "NOLINT(): because of that"]:

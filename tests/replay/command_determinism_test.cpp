@@ -97,19 +97,6 @@ TEST_P(Determinism, ShorterRunGivesTheRowsOfTheWholeOneUpToItsEnd) {
   EXPECT_GT(compared, 20U);
 }
 
-TEST_P(Determinism, EachInstructionSetGivesTheSameBytes) {
-  ASSERT_GE(simd_targets().size(), 2U) << "this machine has but the plain references";
-  std::vector<std::string> arguments = preset_;
-  replay(sequence_.string(), folder_ / "best", arguments);
-  for (const SimdTarget target : simd_targets()) {
-    SCOPED_TRACE(to_string(target));
-    arguments = preset_;
-    arguments.insert(arguments.end(), {"--simd", to_string(target)});
-    replay(sequence_.string(), folder_ / to_string(target), arguments);
-    expect_same_results(folder_ / "best", folder_ / to_string(target));
-  }
-}
-
 TEST_P(Determinism, PicturesAreTheSame) {
   for (const char* name : {"first", "second"}) {
     std::vector<std::string> arguments = preset_;
@@ -131,6 +118,53 @@ TEST_P(Determinism, PicturesAreTheSame) {
 
 INSTANTIATE_TEST_SUITE_P(Presets, Determinism, testing::Values("robust", "thesis"),
                          [](const auto& instance) { return std::string(instance.param); });
+
+struct Variant {
+  const char* preset;
+  Paint paint;
+  const char* mode;  ///< of disparity
+};
+
+class InstructionSets : public testing::TestWithParam<Variant> {};
+
+TEST_P(InstructionSets, EachGivesTheSameBytes) {
+  ASSERT_GE(simd_targets().size(), 2U) << "this machine has but the plain references";
+  const TempDir folder;
+  const fs::path sequence = folder / "sequence";
+  const ProgramResult result =
+      stereotrack_command({"synth", "eleven", "--out", sequence.string(), "--frames", "60", "--size", "320x240"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  if (GetParam().paint == Paint::kGrey) {
+    for (const char* view : {"left", "right"}) {
+      for (const std::string& name : names_in(sequence / view)) {
+        const std::string file = (sequence / view / name).string();
+        ASSERT_TRUE(cv::imwrite(file, cv::imread(file, cv::IMREAD_GRAYSCALE)));
+      }
+    }
+  }
+  const std::vector<std::string> arguments{"--set", std::string("preset=") + GetParam().preset, "--set",
+                                           std::string("disparity.mode=") + GetParam().mode};
+  replay(sequence.string(), folder / "best", arguments);
+  EXPECT_EQ(summary_of(folder / "best")["colour"], GetParam().paint == Paint::kColour);
+  for (const SimdTarget target : simd_targets()) {
+    SCOPED_TRACE(to_string(target));
+    std::vector<std::string> with_target = arguments;
+    with_target.insert(with_target.end(), {"--simd", to_string(target)});
+    replay(sequence.string(), folder / to_string(target), with_target);
+    expect_same_results(folder / "best", folder / to_string(target));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Variants, InstructionSets,
+    testing::Values(Variant{"robust", Paint::kColour, "regions"}, Variant{"robust", Paint::kColour, "dense"},
+                    Variant{"robust", Paint::kGrey, "regions"}, Variant{"robust", Paint::kGrey, "dense"},
+                    Variant{"thesis", Paint::kColour, "regions"}, Variant{"thesis", Paint::kColour, "dense"},
+                    Variant{"thesis", Paint::kGrey, "regions"}, Variant{"thesis", Paint::kGrey, "dense"}),
+    [](const auto& instance) {
+      return std::string(instance.param.preset) + (instance.param.paint == Paint::kGrey ? "_grey_" : "_colour_") +
+             instance.param.mode;
+    });
 
 class SyntheticDeterminism : public testing::TestWithParam<const char*> {};
 

@@ -57,6 +57,18 @@ TEST(Arena, NothingIsHandedOutAfterSeal) {
   EXPECT_EQ(arena.bytes_used(), 16U);
 }
 
+TEST(Arena, CapacityIsWhatWasUsedAndAHeaderForEachRequest) {
+  Arena arena;
+  EXPECT_EQ(arena.capacity(), 0U);
+  ASSERT_FALSE(arena.array<int>(4).empty());
+  ASSERT_FALSE(arena.array<std::uint8_t>(100).empty());
+  EXPECT_EQ(arena.bytes_used(), 116U);
+  EXPECT_EQ(arena.capacity(), 116U + 2 * Arena::kAlignment);
+  arena.seal();
+  EXPECT_TRUE(arena.array<int>(4).empty());
+  EXPECT_EQ(arena.capacity(), 116U + 2 * Arena::kAlignment);
+}
+
 TEST(Arena, MoreThanThereIsFailsAndStaysFailed) {
   Arena arena;
   EXPECT_TRUE(arena.array<std::uint8_t>(std::numeric_limits<std::size_t>::max() / 4).empty());
