@@ -331,11 +331,10 @@ void Pipeline::foreground_from_edges() noexcept {
 
 void Pipeline::foreground_from_model() noexcept {
   background_left_->distance(left_planes(), left_.distance);
-  const Result<double> part = foreground_left_->run(left_.distance, left_.mask);
+  const Result<double> part = foreground_left_->run(left_.distance, moving_);
   light_change_ = part.has_value() && *part * 100 > config_.background.adaptive.relearn_percent;
-  if (light_change_) fill(left_.mask, 0);
-  for (int y = 0; y < setup_.height; ++y) std::copy_n(left_.mask.row(y), setup_.width, moving_.row(y));
-  (void)closing_->run(left_.mask, scratch_);
+  if (light_change_) fill(moving_, 0);
+  (void)closing_->run(moving_, scratch_);
   (void)contour_fill_->run(scratch_, left_.mask);
   ++frames_;
   if (!rectifier_) return;
