@@ -9,13 +9,39 @@
 
 namespace stereotrack {
 
+/// How a picture lies in memory. Chroma is ITU-R BT.601, 128 = no colour.
 enum class PixelFormat : std::uint8_t {
   kGrey8,  ///< one byte a pixel, luma
   kBgr8,   ///< three bytes a pixel, blue green red, full range
+  kYuyv,   ///< two bytes a pixel, Y Cb Y Cr of two neighbours; width even
+  kUyvy,   ///< the same as Cb Y Cr Y
+  kNv12,   ///< height rows of Y, one byte a pixel, then height / 2 rows of Cb Cr for squares of 2 x 2 pixels, as long
+           ///< and as far apart; width and height even
 };
 
+[[nodiscard]] constexpr bool has_colour(PixelFormat format) noexcept { return format != PixelFormat::kGrey8; }
+
+/// In a row; kNv12: of either kind of row.
 [[nodiscard]] constexpr int bytes_per_pixel(PixelFormat format) noexcept {
-  return format == PixelFormat::kBgr8 ? 3 : 1;
+  switch (format) {
+    case PixelFormat::kBgr8: return 3;
+    case PixelFormat::kYuyv:
+    case PixelFormat::kUyvy: return 2;
+    case PixelFormat::kGrey8:
+    case PixelFormat::kNv12: break;
+  }
+  return 1;
+}
+
+/// Rows in memory of a picture of that many pixel rows.
+[[nodiscard]] constexpr int memory_rows(PixelFormat format, int height) noexcept {
+  return format == PixelFormat::kNv12 ? height + height / 2 : height;
+}
+
+/// Whether a picture of that size can have the format.
+[[nodiscard]] constexpr bool fits_format(PixelFormat format, int width, int height) noexcept {
+  const bool in_pairs = format == PixelFormat::kYuyv || format == PixelFormat::kUyvy || format == PixelFormat::kNv12;
+  return !(in_pairs && width % 2 != 0) && !(format == PixelFormat::kNv12 && height % 2 != 0);
 }
 
 /// One sensor's picture as the source delivers it: raw, unrectified, owned by the source.

@@ -7,8 +7,7 @@
 #include "pipeline/motion/chroma_test.hpp"
 #include "pipeline/motion/difference.hpp"
 #include "pipeline/motion/ghost_test.hpp"
-#include "pipeline/photometry/chroma.hpp"
-#include "pipeline/photometry/gray.hpp"
+#include "pipeline/photometry/ingest.hpp"
 #include "pipeline/photometry/smooth.hpp"
 #include "pipeline/shape/region.hpp"
 #include "pipeline/shape/threshold.hpp"
@@ -260,10 +259,11 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
 Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   const bool stereo = rectifier_.has_value();
   const auto fits = [&](const Picture& picture) {
-    return picture.width == setup_.width && picture.height == setup_.height;
+    return picture.width == setup_.width && picture.height == setup_.height &&
+           fits_format(picture.format, picture.width, picture.height);
   };
   if (!fits(pair.left) || (stereo && !fits(pair.right))) return fail(Fault::kBadSize);
-  if (setup_.colour && pair.left.format != PixelFormat::kBgr8) return fail(Fault::kBadFormat);
+  if (setup_.colour && !has_colour(pair.left.format)) return fail(Fault::kBadFormat);
   dt_ = started_ ? std::max(seconds_between(last_time_, pair.capture_time), 0.0) : 0.0;
   last_time_ = pair.capture_time;
   started_ = true;
@@ -311,18 +311,22 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
 }
 
 void Pipeline::ingest(const FramePair& pair) noexcept {
-  gray(pair.left, left_.y);
-  if (setup_.colour) chroma(pair.left, left_.y, left_.cb, left_.cr);
-  equalise_left_.run(left_.y);
-  smooth3x3(left_.y, left_.smooth_y);
-  if (setup_.colour) {
-    smooth3x3(left_.cb, left_.smooth_cb);
-    smooth3x3(left_.cr, left_.smooth_cr);
+  const auto take = [](const Picture& picture, const Planes& view, Equalise& equalise) {
+    Histogram histogram{};
+    ingest_picture(picture, {view.y, view.cb, view.cr}, equalise.needs_histogram() ? &histogram : nullptr);
+    equalise.run(histogram, view.y);
+  };
+  take(pair.left, left_, equalise_left_);
+  if (rectifier_) take(pair.right, right_, equalise_right_);
+  if (background_left_) {
+    smooth3x3(left_.y, left_.smooth_y);
+    if (setup_.colour) {
+      smooth3x3(left_.cb, left_.smooth_cb);
+      smooth3x3(left_.cr, left_.smooth_cr);
+    }
   }
   if (!rectifier_) return;
-  gray(pair.right, right_.y);
-  equalise_right_.run(right_.y);
-  smooth3x3(right_.y, right_.smooth_y);
+  if (background_right_) smooth3x3(right_.y, right_.smooth_y);
   left_.canvas.show(left_.y);
   right_.canvas.show(right_.y);
 }
@@ -358,11 +362,10 @@ void Pipeline::foreground_from_edges() noexcept {
 
 void Pipeline::foreground_from_model() noexcept {
   background_left_->distance(left_planes(), left_.distance);
-  const Result<double> part = foreground_left_->run(left_.distance, left_.mask);
+  const Result<double> part = foreground_left_->run(left_.distance, moving_);
   light_change_ = part.has_value() && *part * 100 > config_.background.adaptive.relearn_percent;
-  if (light_change_) fill(left_.mask, 0);
-  for (int y = 0; y < setup_.height; ++y) std::copy_n(left_.mask.row(y), setup_.width, moving_.row(y));
-  (void)closing_->run(left_.mask, scratch_);
+  if (light_change_) fill(moving_, 0);
+  (void)closing_->run(moving_, scratch_);
   (void)contour_fill_->run(scratch_, left_.mask);
   ++frames_;
   if (!rectifier_) return;

@@ -67,7 +67,7 @@ class Pipeline {
   struct Setup {
     int width = 0;                                   ///< of one raw picture [px]
     int height = 0;                                  ///< [px]
-    bool colour = false;                             ///< the source gives kBgr8
+    bool colour = false;                             ///< the source's formats have colour
     const StereoCalibration* calibration = nullptr;  ///< null: mono
     StageObserver observer;
   };

@@ -43,9 +43,17 @@ cv::Mat to_bgr(const Picture& raw) {
   // OpenCV has no Mat over const pixels; they are only read.
   auto* pixels = const_cast<std::uint8_t*>(raw.data);
   const auto stride = static_cast<std::size_t>(raw.stride_bytes);
-  if (raw.format == PixelFormat::kBgr8) return {raw.height, raw.width, CV_8UC3, pixels, stride};
+  const auto memory = [&](int type) {
+    return cv::Mat(memory_rows(raw.format, raw.height), raw.width, type, pixels, stride);
+  };
   cv::Mat colour;
-  cv::cvtColor(cv::Mat(raw.height, raw.width, CV_8UC1, pixels, stride), colour, cv::COLOR_GRAY2BGR);
+  switch (raw.format) {
+    case PixelFormat::kBgr8: return memory(CV_8UC3);
+    case PixelFormat::kYuyv: cv::cvtColor(memory(CV_8UC2), colour, cv::COLOR_YUV2BGR_YUYV); break;
+    case PixelFormat::kUyvy: cv::cvtColor(memory(CV_8UC2), colour, cv::COLOR_YUV2BGR_UYVY); break;
+    case PixelFormat::kNv12: cv::cvtColor(memory(CV_8UC1), colour, cv::COLOR_YUV2BGR_NV12); break;
+    case PixelFormat::kGrey8: cv::cvtColor(memory(CV_8UC1), colour, cv::COLOR_GRAY2BGR); break;
+  }
   return colour;
 }
 

@@ -131,7 +131,7 @@ Pipeline make_pipeline(const Rig& rig, Arena& arena, const StageObserver& observ
   Pipeline::Setup setup;
   setup.width = info.width;
   setup.height = info.height;
-  setup.colour = info.format == PixelFormat::kBgr8;
+  setup.colour = has_colour(info.format);
   setup.calibration = info.stereo ? &*rig.calibration : nullptr;
   setup.observer = observer;
   const Result<Pipeline> pipeline = Pipeline::create(rig.configuration().pipeline, setup, arena);

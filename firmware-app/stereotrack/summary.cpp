@@ -42,7 +42,8 @@ void Digest::add(const Picture& picture) noexcept {
   add(std::as_bytes(std::span(head)));
   const auto row_bytes =
       static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(bytes_per_pixel(picture.format));
-  for (int y = 0; y < picture.height; ++y) add(std::as_bytes(std::span(picture.row(y), row_bytes)));
+  const int rows = memory_rows(picture.format, picture.height);
+  for (int y = 0; y < rows; ++y) add(std::as_bytes(std::span(picture.row(y), row_bytes)));
 }
 
 std::string Digest::hex() const {

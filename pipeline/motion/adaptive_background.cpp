@@ -1,19 +1,11 @@
 #include "pipeline/motion/adaptive_background.hpp"
 
 #include <algorithm>
-#include <array>
-#include <numeric>
 
 #include "pipeline/motion/distance_kernel.hpp"
 #include "pipeline/motion/learn_kernel.hpp"
 
 namespace stereotrack {
-
-namespace {
-
-constexpr int kSameLight = 256;  // a gain
-
-}  // namespace
 
 Result<AdaptiveBackground> AdaptiveBackground::create(const Config& config, int width, int height, bool colour,
                                                       Arena& arena) noexcept {
@@ -39,35 +31,35 @@ Result<AdaptiveBackground> AdaptiveBackground::create(const Config& config, int 
   }
   self.age_ = arena.image<std::uint16_t>(width, height);
   self.candidate_age_ = arena.image<std::uint16_t>(width, height);
-  self.luma_ = arena.image<std::uint8_t>(width, height);
   self.range_ = arena.array<std::uint8_t>(static_cast<std::size_t>(width));
-  self.bins_ = arena.array<std::uint16_t>(static_cast<std::size_t>(width));
-  self.foreground_ = arena.image<std::uint8_t>(width, height);
+  const auto samples = [](int size) { return static_cast<std::size_t>((size + kGainStep - 1) / kGainStep); };
+  self.bins_ = arena.array<std::uint16_t>(samples(width) * samples(height));
+  self.foreground_ = arena.image<std::uint8_t>(width, static_cast<int>(samples(height)));
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
 }
 
 int AdaptiveBackground::estimate_gain(ImageView<const std::uint8_t> y) const noexcept {
-  // Neighbours mostly fall into one bin, and four tables need not wait for each other's last count.
-  constexpr int kTables = 4;
-  std::array<std::array<std::uint32_t, kGainBins + 1>, kTables> histogram{};
   const int columns = (y.width + kGainStep - 1) / kGainStep;
-  for (int v = 0; v < y.height; v += kGainStep) {
-    gain_bins(y.row(v), y_.mean.row(v), foreground_.row(v), columns, bins_.data());
-    for (int i = 0; i < columns; ++i) ++histogram[static_cast<std::size_t>(i % kTables)][bins_[i]];
+  int count = 0;
+  for (int v = 0; v < y.height; v += kGainStep, count += columns) {
+    gain_bins(y.row(v), y_.mean.row(v), foreground_.row(v / kGainStep), columns, bins_.data() + count);
   }
-  for (int table = 1; table < kTables; ++table) {
-    for (std::size_t bin = 0; bin < kGainBins; ++bin) histogram[0][bin] += histogram[table][bin];
-  }
-  const std::uint32_t total = std::accumulate(histogram[0].begin(), histogram[0].end() - 1, 0U);
+  const int total = count_up_to(bins_.data(), count, kGainBins - 1);
   if (total < 64) return 256;
-  std::uint32_t below = 0;
-  int median = 0;
-  while (below + histogram[0][static_cast<std::size_t>(median)] <= total / 2) {
-    below += histogram[0][static_cast<std::size_t>(median)];
-    ++median;
+  // The median by halving: the ratio that more than half of the pixels do not exceed. A histogram would be one pass,
+  // but not in vectors.
+  int low = 0;
+  int high = kGainBins - 1;
+  while (low < high) {
+    const int middle = (low + high) / 2;
+    if (count_up_to(bins_.data(), count, middle) > total / 2) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
   }
-  return std::clamp(median, 64, 1023);
+  return std::clamp(low, 64, 1023);
 }
 
 void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t> out) noexcept {
@@ -78,18 +70,14 @@ void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t>
     return;
   }
   gain_ = estimate_gain(picture.y);
-  for (int y = 0; y < height; ++y) {
-    lit_row(y_.mean.row(y), gain_, width, luma_.row(y));
-    if (colour_) {
-      lit_row(cb_.mean.row(y), kSameLight, width, cb_.shown.row(y));
-      lit_row(cr_.mean.row(y), kSameLight, width, cr_.shown.row(y));
-    }
-  }
   const auto channel = [](ImageView<const std::uint8_t> plane, const Channel& known, int y) {
-    return ChannelRow{plane.row(y), known.mean.row(y), known.deviation.row(y)};
+    return ChannelRow{plane.row(y), known.mean.row(y), known.deviation.row(y), known.shown.row(y)};
   };
+  // Row by row, so that each is still at hand when its neighbours need it.
+  lit_row(y_.mean.row(0), gain_, width, y_.shown.row(0));
   for (int y = 0; y < height; ++y) {
-    range_row({luma_.row(std::max(y - 1, 0)), luma_.row(y), luma_.row(std::min(y + 1, height - 1))}, width,
+    if (y + 1 < height) lit_row(y_.mean.row(y + 1), gain_, width, y_.shown.row(y + 1));
+    range_row({y_.shown.row(std::max(y - 1, 0)), y_.shown.row(y), y_.shown.row(std::min(y + 1, height - 1))}, width,
               range_.data());
     distance_row({.y = channel(picture.y, y_, y),
                   .cb = colour_ ? channel(picture.cb, cb_, y) : ChannelRow{},
@@ -109,7 +97,7 @@ void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8
   };
   std::uint64_t changed = 0;
   for (int y = 0; y < age_.height; ++y) {
-    if (seen_ > 0) std::copy_n(mask.row(y), age_.width, foreground_.row(y));
+    if (seen_ > 0 && y % kGainStep == 0) std::copy_n(mask.row(y), age_.width, foreground_.row(y / kGainStep));
     LearnRow row{.channels = {channel(picture.y, y_, y)},
                  .count = colour_ ? 3 : 1,
                  .age = age_.row(y),

@@ -72,7 +72,7 @@ class AdaptiveBackground {
   void restart() noexcept;
 
   /// The background's luma under the present light [grey levels]; valid after distance().
-  [[nodiscard]] ImageView<const std::uint8_t> luma() const noexcept { return luma_; }
+  [[nodiscard]] ImageView<const std::uint8_t> luma() const noexcept { return y_.shown; }
   [[nodiscard]] ImageView<const std::uint8_t> blue() const noexcept { return cb_.shown; }
   [[nodiscard]] ImageView<const std::uint8_t> red() const noexcept { return cr_.shown; }
   /// Gain of the light against the background, 256 = unchanged.
@@ -98,10 +98,9 @@ class AdaptiveBackground {
   Channel cr_;
   ImageView<std::uint16_t> age_;
   ImageView<std::uint16_t> candidate_age_;
-  ImageView<std::uint8_t> luma_;
-  ImageView<std::uint8_t> foreground_;
-  std::span<std::uint8_t> range_;  // of one row
-  std::span<std::uint16_t> bins_;  // of one row
+  ImageView<std::uint8_t> foreground_;  // mask of the last learn(), of every kGainStep-th row
+  std::span<std::uint8_t> range_;       // of one row
+  std::span<std::uint16_t> bins_;       // of all pixels that the gain is estimated from
 };
 static_assert(RealTimeStage<AdaptiveBackground, &AdaptiveBackground::distance, &AdaptiveBackground::learn,
                             &AdaptiveBackground::restart>);

@@ -36,7 +36,6 @@ namespace {
 void mark(ImageView<const std::uint8_t> distance, const CandidateLimits& limits, const CandidateWorkspace& work) {
   mark_candidates_reference(distance, limits, work);
 }
-void vote(const CandidateWorkspace& work, ImageView<std::uint8_t> mask) { keep_majority_reference(work, mask); }
 
 #else
 
@@ -48,28 +47,7 @@ using Bytes = hn::CappedTag<std::uint8_t, kFrame>;
 constexpr Bytes kBytes{};
 constexpr hn::RepartitionToWide<Bytes> kWords{};
 constexpr hn::RebindToSigned<hn::RepartitionToWide<Bytes> > kSigned{};
-
-// Horizontal halves of maximum and sum of the 5x5 neighbourhood.
-void enter_row(const std::uint8_t* from, int width, const CandidateWorkspace& work, int y) {
-  std::uint8_t* distance = work.distance.row(y % kRing);
-  std::memcpy(distance, from, static_cast<std::size_t>(width));
-  std::uint8_t* most = work.most.row(y % kRing);
-  std::uint16_t* sum = work.sum.row(y % kRing);
-  const int lanes = static_cast<int>(hn::Lanes(kBytes));
-  for (int x = 0; x < width; x += lanes) {
-    const auto left = hn::LoadU(kBytes, distance + x - 2);
-    const auto here = hn::LoadU(kBytes, distance + x);
-    const auto right = hn::LoadU(kBytes, distance + x + 2);
-    const auto next = hn::Max(hn::LoadU(kBytes, distance + x - 1), hn::LoadU(kBytes, distance + x + 1));
-    hn::StoreU(hn::Max(hn::Max(left, right), hn::Max(here, next)), kBytes, most + x);
-    // Even pixel x: left holds x-2 and x-1, here x and x+1, right x+2. Odd pixel x+1: left holds x-1, right x+2 and
-    // x+3.
-    const auto common =
-        hn::Add(hn::Add(even_bytes(here), odd_bytes(here)), hn::Add(odd_bytes(left), even_bytes(right)));
-    hn::StoreU(hn::Add(common, even_bytes(left)), kWords, sum + x);
-    hn::StoreU(hn::Add(common, odd_bytes(right)), kWords, sum + x + lanes / 2);
-  }
-}
+using Byte = hn::Vec<Bytes>;
 
 // Half of the lanes: 1 where there is a candidate. Nothing here reaches 2^15.
 template <class V>
@@ -88,69 +66,86 @@ V candidates_of(V here16, V most16, V sum16, V columns16, int rows, const Candid
   return hn::BitCast(kWords, hn::IfThenElseZero(hn::AndNot(none, inside), set(1)));
 }
 
+/// The five rows around one, `rows` of which lie in the picture.
+struct Around {
+  const std::uint8_t* distance[kRing];
+  const std::uint8_t* columns;
+  int rows;
+};
+
+// A vector of pixels, each of which may be a candidate: 1 where there is one.
+Byte look_closely(const Around& around, int x, const CandidateLimits& limits) {
+  Byte most = hn::Zero(kBytes);
+  auto even = hn::Zero(kWords);
+  auto odd = even;
+  for (const std::uint8_t* row : around.distance) {
+    const Byte left = hn::LoadU(kBytes, row + x - 2);
+    const Byte here = hn::LoadU(kBytes, row + x);
+    const Byte right = hn::LoadU(kBytes, row + x + 2);
+    const Byte next = hn::Max(hn::LoadU(kBytes, row + x - 1), hn::LoadU(kBytes, row + x + 1));
+    most = hn::Max(hn::Max(most, next), hn::Max(hn::Max(left, right), here));
+    // Even pixel x: left holds x-2 and x-1, here x and x+1, right x+2. Odd pixel x+1: left holds x-1, right x+2 and
+    // x+3.
+    const auto common =
+        hn::Add(hn::Add(even_bytes(here), odd_bytes(here)), hn::Add(odd_bytes(left), even_bytes(right)));
+    even = hn::Add(even, hn::Add(common, even_bytes(left)));
+    odd = hn::Add(odd, hn::Add(common, odd_bytes(right)));
+  }
+  const Byte here = hn::LoadU(kBytes, around.distance[kReach] + x);
+  const Byte wide = hn::LoadU(kBytes, around.columns + x);
+  return zip_bytes(candidates_of(even_bytes(here), even_bytes(most), even, even_bytes(wide), around.rows, limits),
+                   candidates_of(odd_bytes(here), odd_bytes(most), odd, odd_bytes(wide), around.rows, limits));
+}
+
 void mark(ImageView<const std::uint8_t> distance, const CandidateLimits& limits, const CandidateWorkspace& work) {
   const int width = distance.width;
   const int height = distance.height;
   const int lanes = static_cast<int>(hn::Lanes(kBytes));
-  const std::uint8_t* columns = work.columns[1].data();
-  for (int y = 0; y < std::min(kReach, height); ++y) enter_row(distance.row(y), width, work, y);
+  const Byte low = hn::Set(kBytes, static_cast<std::uint8_t>(limits.low));
+  std::uint8_t* sums = work.column_sums.data() + kFrame;
+  std::uint8_t* least = work.least_sums.data();
+  const auto enter = [&](int y) {
+    std::memcpy(work.distance.row(y % kRing), distance.row(y), static_cast<std::size_t>(width));
+  };
+  for (int y = 0; y < std::min(kReach, height); ++y) enter(y);
+  int rows_before = 0;
   for (int y = 0; y < height; ++y) {
-    if (y + kReach < height) enter_row(distance.row(y + kReach), width, work, y + kReach);
-    const std::uint8_t* most_rows[kRing];
-    const std::uint16_t* sum_rows[kRing];
-    int rows = 0;
+    if (y + kReach < height) enter(y + kReach);
+    Around around{.distance = {}, .columns = work.columns.data(), .rows = 0};
     for (int i = 0; i < kRing; ++i) {
       const int v = y + i - kReach;
       const bool inside = v >= 0 && v < height;
-      most_rows[i] = work.most.row(inside ? v % kRing : kRing);
-      sum_rows[i] = work.sum.row(inside ? v % kRing : kRing);
-      rows += inside ? 1 : 0;
+      around.distance[i] = work.distance.row(inside ? v % kRing : kRing);
+      around.rows += inside ? 1 : 0;
     }
-    const std::uint8_t* here_row = work.distance.row(y % kRing);
-    std::uint8_t* out = work.candidates.row(y);
+    if (around.rows != rows_before) {
+      rows_before = around.rows;
+      for (int x = 0; x < width + kFrame; ++x) {
+        const int sum = around.columns[x] == 0 ? 255 : limits.faint * around.rows * around.columns[x];
+        least[x] = static_cast<std::uint8_t>(std::min(sum, 255));
+      }
+    }
     for (int x = 0; x < width; x += lanes) {
-      auto most = hn::LoadU(kBytes, most_rows[0] + x);
-      auto even = hn::LoadU(kWords, sum_rows[0] + x);
-      auto odd = hn::LoadU(kWords, sum_rows[0] + x + lanes / 2);
-      for (int i = 1; i < kRing; ++i) {
-        most = hn::Max(most, hn::LoadU(kBytes, most_rows[i] + x));
-        even = hn::Add(even, hn::LoadU(kWords, sum_rows[i] + x));
-        odd = hn::Add(odd, hn::LoadU(kWords, sum_rows[i] + x + lanes / 2));
-      }
-      const auto here = hn::LoadU(kBytes, here_row + x);
-      const auto wide = hn::LoadU(kBytes, columns + x);
-      hn::StoreU(zip_bytes(candidates_of(even_bytes(here), even_bytes(most), even, even_bytes(wide), rows, limits),
-                           candidates_of(odd_bytes(here), odd_bytes(most), odd, odd_bytes(wide), rows, limits)),
-                 kBytes, out + x);
+      const auto row = [&](int i) HWY_ATTR { return hn::LoadU(kBytes, around.distance[i] + x); };
+      const Byte outer = hn::SaturatedAdd(hn::SaturatedAdd(row(0), row(1)), hn::SaturatedAdd(row(3), row(4)));
+      hn::StoreU(hn::SaturatedAdd(outer, row(2)), kBytes, sums + x);
     }
-  }
-}
-
-void vote(const CandidateWorkspace& work, ImageView<std::uint8_t> mask) {
-  const hn::RebindToSigned<Bytes> signed_bytes;
-  const int lanes = static_cast<int>(hn::Lanes(kBytes));
-  const std::uint8_t* columns = work.columns[0].data();
-  for (int y = 0; y < mask.height; ++y) {
-    const int rows = std::min(y + 1, mask.height - 1) - std::max(y - 1, 0) + 1;
-    std::uint8_t* out = mask.row(y);
-    for (int x = 0; x < mask.width; x += lanes) {
-      const auto wide = hn::LoadU(kBytes, columns + x);
-      auto voters = wide;
-      for (int i = 1; i < rows; ++i) voters = hn::Add(voters, wide);
-      auto votes = hn::Zero(kBytes);
-      for (int v = y - 1; v <= y + 1; ++v) {
-        const std::uint8_t* row = work.candidates.row(v) + x;  // row -1 and row `height` are zeros
-        votes = hn::Add(
-            votes, hn::Add(hn::LoadU(kBytes, row), hn::Add(hn::LoadU(kBytes, row - 1), hn::LoadU(kBytes, row + 1))));
-      }
-      const auto majority = hn::Lt(hn::BitCast(signed_bytes, voters), hn::BitCast(signed_bytes, hn::Add(votes, votes)));
-      const auto value = hn::BitCast(kBytes, hn::VecFromMask(signed_bytes, majority));
-      if (x + lanes <= mask.width) {
-        hn::StoreU(value, kBytes, out + x);
+    auto* bits = reinterpret_cast<std::uint8_t*>(work.candidates.row(y));
+    for (int x = 0; x < width; x += lanes) {
+      // Most vectors hold no pixel that is strong enough, nor one whose neighbourhood is: sums that saturate tell, as
+      // they are never too small to pass.
+      const auto column = [&](int i) HWY_ATTR { return hn::LoadU(kBytes, sums + x + i); };
+      const Byte outer =
+          hn::SaturatedAdd(hn::SaturatedAdd(column(-2), column(-1)), hn::SaturatedAdd(column(1), column(2)));
+      const Byte sum = hn::SaturatedAdd(outer, column(0));
+      const Byte here = hn::LoadU(kBytes, around.distance[kReach] + x);
+      const auto strong = hn::Eq(hn::Max(here, low), here);
+      const auto faint = hn::Eq(hn::Max(sum, hn::LoadU(kBytes, least + x)), sum);
+      if (hn::AllFalse(kBytes, hn::Or(strong, faint))) {
+        std::memset(bits + x / 8, 0, static_cast<std::size_t>(lanes) / 8);
       } else {
-        alignas(kFrame) std::uint8_t end[kFrame];
-        hn::Store(value, kBytes, end);
-        std::memcpy(out + x, end, static_cast<std::size_t>(mask.width - x));
+        const auto found = hn::Ne(look_closely(around, x, limits), hn::Zero(kBytes));
+        hn::StoreMaskBits(kBytes, found, bits + x / 8);
       }
     }
   }
@@ -170,27 +165,82 @@ namespace stereotrack {
 namespace {
 
 HWY_EXPORT(mark);
-HWY_EXPORT(vote);
+
+using Votes = CandidateWorkspace::Votes;
+
+// How many of each pixel and its two neighbours in the row are set. False where none is.
+bool count_row(const std::uint64_t* bits, int words, const Votes& votes) noexcept {
+  std::uint64_t* ones = votes.ones.data();
+  std::uint64_t* twos = votes.twos.data();
+  std::uint64_t any = 0;
+  std::uint64_t before = 0;
+  std::uint64_t here = bits[0];
+  for (int w = 0; w < words; ++w) {
+    const std::uint64_t next = w + 1 < words ? bits[w + 1] : 0;
+    const std::uint64_t left = here << 1 | before >> 63;
+    const std::uint64_t right = here >> 1 | next << 63;
+    ones[w] = left ^ here ^ right;
+    twos[w] = (left & here) | (right & (left | here));
+    any |= here;
+    before = here;
+    here = next;
+  }
+  return any != 0;
+}
+
+// Three numbers of two bits added: where the sum is at least four, and at least five.
+struct Sum {
+  std::uint64_t four;
+  std::uint64_t five;
+};
+Sum sum_of(const std::array<Votes, 3>& rows, int w) noexcept {
+  const std::uint64_t a1 = rows[0].ones[w];
+  const std::uint64_t b1 = rows[1].ones[w];
+  const std::uint64_t c1 = rows[2].ones[w];
+  const std::uint64_t a2 = rows[0].twos[w];
+  const std::uint64_t b2 = rows[1].twos[w];
+  const std::uint64_t c2 = rows[2].twos[w];
+  const std::uint64_t carry = (a1 & b1) | (c1 & (a1 | b1));
+  const std::uint64_t odd_twos = a2 ^ b2 ^ c2;
+  const std::uint64_t more = odd_twos & carry;
+  const std::uint64_t two_twos = (a2 & b2) | (c2 & (a2 | b2));
+  const std::uint64_t four = two_twos | more;
+  const std::uint64_t eight = two_twos & more;
+  return {four, eight | (four & ((odd_twos ^ carry) | (a1 ^ b1 ^ c1)))};
+}
+
+bool is_majority(const BitMask& candidates, int x, int y) noexcept {
+  int votes = 0;
+  int voters = 0;
+  for (int v = std::max(y - 1, 0); v <= std::min(y + 1, candidates.height - 1); ++v) {
+    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, candidates.width - 1); ++u) {
+      votes += candidates.at(u, v) ? 1 : 0;
+      ++voters;
+    }
+  }
+  return 2 * votes > voters;
+}
 
 }  // namespace
 
 CandidateWorkspace CandidateWorkspace::create(int width, int height, Arena& arena) noexcept {
-  const auto framed = [&](int rows) {
-    ImageView<std::uint8_t> all = arena.image<std::uint8_t>(width + 2 * kFrame, rows + 2);
-    return all.empty() ? all : all.window(kFrame, 1, width, rows);
+  const auto row = [&](int frames) {
+    return arena.array<std::uint8_t>(static_cast<std::size_t>(width) + static_cast<std::size_t>(frames) * kFrame);
   };
   CandidateWorkspace work;
-  work.distance = framed(kRing);
-  work.candidates = framed(height);
-  work.most = arena.image<std::uint8_t>(width, kRing + 1);
-  work.sum = arena.image<std::uint16_t>(width + kFrame, kRing + 1);
-  for (int reach = 1; reach <= kReach; ++reach) {
-    const std::span<std::uint8_t> columns = arena.array<std::uint8_t>(static_cast<std::size_t>(width) + kFrame);
-    work.columns[static_cast<std::size_t>(reach) - 1] = columns;
-    if (columns.empty()) continue;
-    for (int x = 0; x < width; ++x) {
-      columns[x] = static_cast<std::uint8_t>(std::min(x + reach, width - 1) - std::max(x - reach, 0) + 1);
-    }
+  work.candidates = BitMask::create(width, height, arena);
+  const ImageView<std::uint8_t> ring = arena.image<std::uint8_t>(width + 2 * kFrame, kRing + 1);
+  if (!ring.empty()) work.distance = ring.window(kFrame, 0, width, kRing + 1);
+  work.column_sums = row(3);
+  work.columns = row(1);
+  work.least_sums = row(1);
+  for (Votes& votes : work.votes) {
+    votes.ones = arena.array<std::uint64_t>(static_cast<std::size_t>(BitMask::words_of(width)));
+    votes.twos = arena.array<std::uint64_t>(static_cast<std::size_t>(BitMask::words_of(width)));
+  }
+  if (arena.failed()) return {};
+  for (int x = 0; x < width; ++x) {
+    work.columns[x] = static_cast<std::uint8_t>(std::min(x + kReach, width - 1) - std::max(x - kReach, 0) + 1);
   }
   return work;
 }
@@ -213,23 +263,7 @@ void mark_candidates_reference(ImageView<const std::uint8_t> distance, const Can
       const bool strong = here >= limits.low && here * 100 >= most * limits.halo_percent;
       const bool faint =
           here < limits.low && most >= limits.faint && sum >= limits.faint * count && sum * kFaintPart >= most * count;
-      work.candidates.at(x, y) = strong || faint ? 1 : 0;
-    }
-  }
-}
-
-void keep_majority_reference(const CandidateWorkspace& work, ImageView<std::uint8_t> mask) noexcept {
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      int votes = 0;
-      int voters = 0;
-      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, mask.height - 1); ++v) {
-        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, mask.width - 1); ++u) {
-          votes += work.candidates.at(u, v);
-          ++voters;
-        }
-      }
-      mask.at(x, y) = 2 * votes > voters ? 255 : 0;
+      work.candidates.set(x, y, strong || faint);
     }
   }
 }
@@ -240,9 +274,50 @@ void mark_candidates(ImageView<const std::uint8_t> distance, const CandidateLimi
   HWY_DYNAMIC_DISPATCH(mark)(distance, limits, work);
 }
 
-void keep_majority(const CandidateWorkspace& work, ImageView<std::uint8_t> mask) noexcept {
-  if (simd_in_use() == SimdTarget::kScalar) return keep_majority_reference(work, mask);
-  HWY_DYNAMIC_DISPATCH(vote)(work, mask);
+void keep_majority(const CandidateWorkspace& work, const BitMask& mask) noexcept {
+  const BitMask& candidates = work.candidates;
+  const int words = mask.words_a_row();
+  const int last = mask.height - 1;
+  std::array<bool, 3> any{};
+  const auto enter = [&](int y) {
+    const std::size_t slot = static_cast<std::size_t>(y) % 3;
+    if (y <= last) {
+      any[slot] = count_row(candidates.row(y), words, work.votes[slot]);
+      return;
+    }
+    any[slot] = false;
+    std::fill_n(work.votes[slot].ones.begin(), words, std::uint64_t{0});
+    std::fill_n(work.votes[slot].twos.begin(), words, std::uint64_t{0});
+  };
+  // Above the first row nothing lies, as under the last one.
+  std::fill_n(work.votes[2].ones.begin(), words, std::uint64_t{0});
+  std::fill_n(work.votes[2].twos.begin(), words, std::uint64_t{0});
+  enter(0);
+  for (int y = 0; y <= last; ++y) {
+    enter(y + 1);
+    std::uint64_t* out = mask.row(y);
+    if (!any[0] && !any[1] && !any[2]) {
+      std::fill_n(out, words, std::uint64_t{0});
+      continue;
+    }
+    // Of nine voters five are most, of six at the picture's sides four.
+    const bool side = y == 0 || y == last;
+    for (int w = 0; w < words; ++w) {
+      const Sum sum = sum_of(work.votes, w);
+      std::uint64_t few = side ? ~std::uint64_t{0} : 0;
+      if (w == 0) few |= 1;
+      if (w == words - 1) few |= std::uint64_t{1} << (mask.width - 1) % 64;
+      out[w] = sum.five | (sum.four & few);
+    }
+    out[words - 1] &= BitMask::last_word(mask.width);
+  }
+  // Its corners have four, and a picture of one row or column has fewer everywhere.
+  const bool narrow = mask.width == 1 || mask.height == 1;
+  for (int y = 0; y <= last; y += narrow ? 1 : std::max(last, 1)) {
+    for (int x = 0; x < mask.width; x += narrow ? 1 : std::max(mask.width - 1, 1)) {
+      mask.set(x, y, is_majority(candidates, x, y));
+    }
+  }
 }
 
 }  // namespace stereotrack

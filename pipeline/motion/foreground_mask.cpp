@@ -27,6 +27,7 @@ Result<ForegroundMask> ForegroundMask::create(const Config& config, int width, i
   self.high_ = steps(config.high_sd);
   self.min_seeds_ = config.min_seeds;
   self.work_ = CandidateWorkspace::create(width, height, arena);
+  self.majority_ = BitMask::create(width, height, arena);
   const std::size_t runs = std::min(static_cast<std::size_t>(config.max_runs), max_run_count(width, height));
   self.runs_ = arena.array<Run>(runs);
   self.seeds_ = arena.array<std::int32_t>(runs);
@@ -38,12 +39,12 @@ Result<double> ForegroundMask::run(ImageView<const std::uint8_t> distance, Image
   const auto fits = [&](const auto& picture) { return picture.width == width_ && picture.height == height_; };
   if (!fits(distance) || !fits(mask)) return fail(Fault::kBadSize);
   mark_candidates(distance, limits_, work_);
-  keep_majority(work_, mask);
+  keep_majority(work_, majority_);
   return keep_seeded(distance, mask);
 }
 
 double ForegroundMask::keep_seeded(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept {
-  const int count = find_components(mask, RunKind::kObject, runs_).kept;
+  const int count = find_components(majority_, RunKind::kObject, runs_).kept;
   std::fill_n(seeds_.begin(), count, 0);
   for (std::int32_t i = 0; i < count; ++i) {
     const Run& run = runs_[i];

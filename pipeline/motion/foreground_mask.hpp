@@ -48,6 +48,7 @@ class ForegroundMask {
   int high_ = 0;
   int min_seeds_ = 0;
   CandidateWorkspace work_;
+  BitMask majority_;
   std::span<Run> runs_;
   std::span<std::int32_t> seeds_;  // by root run
 };

@@ -2,9 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <numeric>
 
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/stage.hpp"
+#include "pipeline/photometry/equalise_kernel.hpp"
+#include "pipeline/photometry/ingest_kernel.hpp"
 
 namespace stereotrack {
 
@@ -26,31 +29,28 @@ class Equalise {
   struct Config {
     EqualiseMode mode = EqualiseMode::kOff;
   };
-  using Table = std::array<std::uint8_t, 256>;
+  using Table = GreyTable;
 
   explicit Equalise(const Config& config) noexcept : mode_(config.mode) {}
 
-  /// Changes `picture` in place.
-  void run(ImageView<std::uint8_t> picture) noexcept {
+  /// Whether the next run() asks for a histogram.
+  [[nodiscard]] bool needs_histogram() const noexcept {
+    return mode_ == EqualiseMode::kFrame || (mode_ == EqualiseMode::kFrozen && !has_table_);
+  }
+
+  /// Changes `picture` in place. histogram: the picture's; not looked at unless needs_histogram().
+  void run(const Histogram& histogram, ImageView<std::uint8_t> picture) noexcept {
     if (mode_ == EqualiseMode::kOff || picture.empty()) return;
-    if (mode_ == EqualiseMode::kFrame || !has_table_) {
-      table_ = table_of(picture);
+    if (needs_histogram()) {
+      table_ = table_of(histogram);
       has_table_ = true;
     }
-    for (int y = 0; y < picture.height; ++y) {
-      std::uint8_t* row = picture.row(y);
-      for (int x = 0; x < picture.width; ++x) row[x] = table_[row[x]];
-    }
+    for (int y = 0; y < picture.height; ++y) map_row(table_, picture.width, picture.row(y));
   }
 
   /// The transformation T of (3.2)-(3.5). Not decreasing; the brightest value present maps to 255.
-  [[nodiscard]] static Table table_of(ImageView<const std::uint8_t> picture) noexcept {
-    std::array<std::uint32_t, 256> histogram{};
-    for (int y = 0; y < picture.height; ++y) {
-      const std::uint8_t* row = picture.row(y);
-      for (int x = 0; x < picture.width; ++x) ++histogram[row[x]];
-    }
-    const std::uint64_t n = static_cast<std::uint64_t>(picture.width) * static_cast<std::uint64_t>(picture.height);
+  [[nodiscard]] static Table table_of(const Histogram& histogram) noexcept {
+    const std::uint64_t n = std::accumulate(histogram.begin(), histogram.end(), std::uint64_t{0});
     Table table{};
     if (n == 0) return table;
     std::uint64_t below = 0;

@@ -67,6 +67,13 @@ std::uint64_t bits_of_eight(const std::uint8_t* pixels) noexcept {
   return ((bytes & 0x0101010101010101U) * 0x0102040810204080U) >> 56;
 }
 
+/// The other way: 255 in byte i where bit i is set.
+std::uint64_t bytes_of_eight(std::uint64_t bits) noexcept {
+  // Each byte keeps a bit of its own, and carries into its top bit if that is set.
+  const std::uint64_t own = (bits * 0x0101010101010101U) & 0x8040201008040201U;
+  return ((own + 0x7F7F7F7F7F7F7F7FU) >> 7 & 0x0101010101010101U) * 255;
+}
+
 }  // namespace
 
 void row_bits_reference(const std::uint8_t* pixels, int width, std::uint64_t* words) noexcept {
@@ -78,6 +85,22 @@ void row_bits_reference(const std::uint8_t* pixels, int width, std::uint64_t* wo
     for (; i < count; ++i) bits |= static_cast<std::uint64_t>(pixels[x + i] != 0) << i;
     words[x / 64] = bits;
   }
+}
+
+void fill_from_bits(const std::uint64_t* words, int width, std::uint8_t* pixels) noexcept {
+  int x = 0;
+  for (; x + 64 <= width; x += 64) {
+    const std::uint64_t bits = words[x / 64];
+    if (bits == 0) {
+      std::memset(pixels + x, 0, 64);
+    } else {
+      for (int i = 0; i < 64; i += 8) {
+        const std::uint64_t eight = bytes_of_eight(bits >> i & 0xFF);
+        std::memcpy(pixels + x + i, &eight, sizeof eight);
+      }
+    }
+  }
+  for (; x < width; ++x) pixels[x] = (words[x / 64] >> x % 64 & 1) != 0 ? 255 : 0;
 }
 
 void row_bits(const std::uint8_t* pixels, int width, std::uint64_t* words) noexcept {

@@ -1,33 +1,44 @@
 #include "pipeline/shape/morphology.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <utility>
+
+#include "pipeline/shape/bits_kernel.hpp"
 
 namespace stereotrack {
 namespace {
 
-struct Minimum {
-  static constexpr std::uint8_t kNeutral = 255;
-  static std::uint8_t of(std::uint8_t a, std::uint8_t b) noexcept { return a < b ? a : b; }
+struct And {
+  static constexpr std::uint64_t kNeutral = ~std::uint64_t{0};
+  static std::uint64_t of(std::uint64_t a, std::uint64_t b) noexcept { return a & b; }
 };
 
-struct Maximum {
-  static constexpr std::uint8_t kNeutral = 0;
-  static std::uint8_t of(std::uint8_t a, std::uint8_t b) noexcept { return a > b ? a : b; }
+struct Or {
+  static constexpr std::uint64_t kNeutral = 0;
+  static std::uint64_t of(std::uint64_t a, std::uint64_t b) noexcept { return a | b; }
 };
 
-template <class Extreme>
-void pass_3x3(ImageView<const std::uint8_t> in, ImageView<std::uint8_t> out, std::uint8_t* column) noexcept {
-  column[-1] = Extreme::kNeutral;
-  column[in.width] = Extreme::kNeutral;
+// column: words_a_row() words, and one at each end.
+template <class Both>
+void pass_3x3(const BitMask& in, const BitMask& out, std::uint64_t* column) noexcept {
+  const int words = in.words_a_row();
+  const std::uint64_t inside = BitMask::last_word(in.width);
+  column[-1] = Both::kNeutral;
+  column[words] = Both::kNeutral;
   for (int y = 0; y < in.height; ++y) {
-    // At the border the row itself stands in for the one outside: it changes neither minimum nor maximum.
-    const std::uint8_t* above = in.row(std::max(y - 1, 0));
-    const std::uint8_t* here = in.row(y);
-    const std::uint8_t* below = in.row(std::min(y + 1, in.height - 1));
-    for (int x = 0; x < in.width; ++x) column[x] = Extreme::of(Extreme::of(above[x], here[x]), below[x]);
-    std::uint8_t* to = out.row(y);
-    for (int x = 0; x < in.width; ++x) to[x] = Extreme::of(Extreme::of(column[x - 1], column[x]), column[x + 1]);
+    // At the border the row itself stands in for the one outside: it changes neither AND nor OR.
+    const std::uint64_t* above = in.row(std::max(y - 1, 0));
+    const std::uint64_t* here = in.row(y);
+    const std::uint64_t* below = in.row(std::min(y + 1, in.height - 1));
+    for (int w = 0; w < words; ++w) column[w] = Both::of(Both::of(above[w], here[w]), below[w]);
+    column[words - 1] = (column[words - 1] & inside) | (Both::kNeutral & ~inside);
+    std::uint64_t* to = out.row(y);
+    for (int w = 0; w < words; ++w) {
+      const std::uint64_t left = column[w] << 1 | column[w - 1] >> 63;
+      const std::uint64_t right = column[w] >> 1 | column[w + 1] << 63;
+      to[w] = Both::of(Both::of(left, column[w]), right);
+    }
+    to[words - 1] &= inside;
   }
 }
 
@@ -38,35 +49,30 @@ Result<void> Morphology3x3::init(const Config& config, int width, int height, Ar
   config_ = config;
   width_ = width;
   height_ = height;
-  between_ = arena.image<std::uint8_t>(width, height);
-  column_ = arena.array<std::uint8_t>(static_cast<std::size_t>(width) + 2);
-  if (between_.empty() || column_.empty()) return fail(Fault::kOutOfMemory);
+  from_ = BitMask::create(width, height, arena);
+  to_ = BitMask::create(width, height, arena);
+  column_ = arena.array<std::uint64_t>(static_cast<std::size_t>(BitMask::words_of(width)) + 2);
+  if (arena.failed()) return fail(Fault::kOutOfMemory);
   return {};
 }
 
-void Morphology3x3::pass(Pass kind, ImageView<const std::uint8_t> in, ImageView<std::uint8_t> out) noexcept {
+void Morphology3x3::pass(Pass kind, const BitMask& in, const BitMask& out) noexcept {
   if (kind == Pass::kErode) {
-    pass_3x3<Minimum>(in, out, column_.data() + 1);
+    pass_3x3<And>(in, out, column_.data() + 1);
   } else {
-    pass_3x3<Maximum>(in, out, column_.data() + 1);
+    pass_3x3<Or>(in, out, column_.data() + 1);
   }
 }
 
 Result<void> Morphology3x3::run_passes(Pass first, Pass second, ImageView<const std::uint8_t> in,
                                        ImageView<std::uint8_t> out) noexcept {
   if (in.width != width_ || in.height != height_ || !in.same_size(out)) return fail(Fault::kBadSize);
-  if (config_.repeats == 0) {
-    for (int y = 0; y < height_; ++y) std::memmove(out.row(y), in.row(y), static_cast<std::size_t>(width_));
-    return {};
+  for (int y = 0; y < height_; ++y) row_bits(in.row(y), width_, from_.row(y));
+  for (int i = 0; i < 2 * config_.repeats; ++i) {
+    pass(i < config_.repeats ? first : second, from_, to_);
+    std::swap(from_, to_);
   }
-  // An even number of passes, to and fro between `between_` and `out`: the last one ends in `out`.
-  const int passes = 2 * config_.repeats;
-  ImageView<const std::uint8_t> from = in;
-  for (int i = 0; i < passes; ++i) {
-    const ImageView<std::uint8_t> to = i % 2 == 0 ? between_ : out;
-    pass(i < config_.repeats ? first : second, from, to);
-    from = to;
-  }
+  for (int y = 0; y < height_; ++y) fill_from_bits(from_.row(y), width_, out.row(y));
   return {};
 }
 

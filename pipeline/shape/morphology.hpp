@@ -7,6 +7,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
 #include "pipeline/core/stage.hpp"
+#include "pipeline/shape/bit_mask.hpp"
 
 namespace stereotrack {
 
@@ -15,9 +16,9 @@ namespace stereotrack {
 ///     A (+) B = { z | (B^)_z and A meet }                         dilation   (3.14)
 /// B: 3x3 rectangle, which is its own reflection B^. The document prints 3.14's condition as
 /// "[(B^)_z and I] subset of I", which holds for every z; meant is that the intersection is not empty.
-/// On u8 pictures erosion is the minimum and dilation the maximum over the square. What lies outside
+/// On masks, 64 pixels a word, erosion is the AND and dilation the OR over the square. What lies outside
 /// the picture neither erodes nor dilates (OpenCV's default border).
-/// Separable: 2 x 2 comparisons a pixel and pass. `repeats` n is a (2n+1) x (2n+1) square.
+/// Separable: seven operations a word and pass. `repeats` n is a (2n+1) x (2n+1) square.
 class Morphology3x3 {
  public:
   struct Config {
@@ -32,18 +33,19 @@ class Morphology3x3 {
                                         ImageView<std::uint8_t> out) noexcept;
 
  private:
-  void pass(Pass kind, ImageView<const std::uint8_t> in, ImageView<std::uint8_t> out) noexcept;
+  void pass(Pass kind, const BitMask& in, const BitMask& out) noexcept;
 
   Config config_;
   int width_ = 0;
   int height_ = 0;
-  ImageView<std::uint8_t> between_;
-  std::span<std::uint8_t> column_;  // one row of vertical minima or maxima, one neutral element at each end
+  BitMask from_;
+  BitMask to_;
+  std::span<std::uint64_t> column_;  // one row of vertical AND or OR, a neutral word at each end
 };
 
 /// Removes what a 3x3 square does not fit into: noise, thin protrusions, isthmuses.
 ///     A o B = (A (-) B) (+) B                                                (3.13)
-/// In, out: width x height u8 masks (0, 255) or grey; they may be the same memory.
+/// In: a width x height mask, set where it is not 0. Out: 0 or 255, the same size; may be the input's memory.
 /// Fault: kBadSize, output untouched. O(pixels x repeats). One instance a thread.
 class Opening : public Morphology3x3 {
  public:

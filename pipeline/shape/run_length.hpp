@@ -5,6 +5,7 @@
 #include <span>
 
 #include "pipeline/core/image_view.hpp"
+#include "pipeline/shape/bit_mask.hpp"
 
 namespace stereotrack {
 
@@ -37,6 +38,7 @@ struct RunCount {
 /// Finds all runs of `kind` in raster order and joins those that touch, by union-find.
 /// When `runs` is full the rest of the picture is only counted. O(pixels + runs a(runs)).
 [[nodiscard]] RunCount find_components(ImageView<const std::uint8_t> mask, RunKind kind, std::span<Run> runs) noexcept;
+[[nodiscard]] RunCount find_components(const BitMask& mask, RunKind kind, std::span<Run> runs) noexcept;
 
 /// Root of run i. Shortens the path on its way.
 [[nodiscard]] inline std::int32_t root_of(std::span<Run> runs, std::int32_t i) noexcept {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include "pictures.hpp"
 #include "tests/support/each_target.hpp"
 
@@ -24,9 +26,13 @@ Plane scene(cv::Size size, std::uint64_t seed) {
   return distance;
 }
 
-Plane copy_of(ImageView<const std::uint8_t> picture) {
-  Plane copy(picture.height, picture.width);
-  for (int y = 0; y < picture.height; ++y) std::copy_n(picture.row(y), picture.width, copy[y]);
+/// 0 or 1. Also that bits after a row's end are 0.
+Plane copy_of(const BitMask& mask) {
+  Plane copy(mask.height, mask.width);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) copy(y, x) = mask.at(x, y) ? 1 : 0;
+    EXPECT_EQ(mask.row(y)[mask.words_a_row() - 1] & ~BitMask::last_word(mask.width), 0U);
+  }
   return copy;
 }
 
@@ -35,27 +41,39 @@ struct Masks {
   Plane mask;
 };
 
-template <class Mark, class Keep>
-Masks masks_of(Plane distance, const CandidateLimits& limits, Mark&& mark, Keep&& keep) {
+/// Step 3, pixel by pixel.
+Plane majority_of(const Plane& candidates) {
+  const cv::Rect all(0, 0, candidates.cols, candidates.rows);
+  Plane mask(candidates.size());
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) {
+      const cv::Rect near = cv::Rect(x - 1, y - 1, 3, 3) & all;
+      mask(y, x) = 2 * cv::countNonZero(candidates(near)) > near.area() ? 1 : 0;
+    }
+  }
+  return mask;
+}
+
+template <class Mark>
+Masks masks_of(const Plane& distance, const CandidateLimits& limits, Mark&& mark) {
   Arena arena;
   const CandidateWorkspace work = CandidateWorkspace::create(distance.cols, distance.rows, arena);
+  const BitMask mask = BitMask::create(distance.cols, distance.rows, arena);
   EXPECT_FALSE(arena.failed());
-  // Two columns more than the mask, which must stay as they are.
-  Plane wide(distance.rows, distance.cols + 2, std::uint8_t{7});
-  Plane part = wide(cv::Rect(1, 0, distance.cols, distance.rows));
   Plane before(distance.size(), std::uint8_t{255});
   mark(view(before), limits, work);  // what the workspace holds from the last picture must not matter
-  mark(view(distance), limits, work);
-  keep(work, view(part));
-  EXPECT_EQ(cv::countNonZero(wide.col(0) != 7), 0);
-  EXPECT_EQ(cv::countNonZero(wide.col(distance.cols + 1) != 7), 0);
-  return {copy_of(work.candidates), part.clone()};
+  keep_majority(work, mask);
+  Plane copy = distance.clone();
+  mark(view(copy), limits, work);
+  keep_majority(work, mask);
+  return {copy_of(work.candidates), copy_of(mask)};
 }
 
 void expect_reference_on_each_target(const Plane& distance, const CandidateLimits& limits) {
-  const Masks expected = masks_of(distance, limits, mark_candidates_reference, keep_majority_reference);
+  const Masks expected = masks_of(distance, limits, mark_candidates_reference);
+  EXPECT_EQ(cv::countNonZero(expected.mask != majority_of(expected.candidates)), 0) << distance.size();
   on_each_target([&] {
-    const Masks got = masks_of(distance, limits, mark_candidates, keep_majority);
+    const Masks got = masks_of(distance, limits, mark_candidates);
     EXPECT_EQ(cv::countNonZero(got.candidates != expected.candidates), 0) << distance.size();
     EXPECT_EQ(cv::countNonZero(got.mask != expected.mask), 0) << distance.size();
   });
@@ -84,11 +102,39 @@ TEST(CandidateKernel, ExtremeLimitsAreTheReference) {
   expect_reference_on_each_target(Plane(33, 97, std::uint8_t{0}), {0, 0, 0});
 }
 
+// Quiet pictures, in which most vectors are passed over, with a few pixels that must not be.
+TEST(CandidateKernel, SparsePicturesAreTheReference) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    Plane distance = random_plane({200, 20}, 0, 3, seed);
+    cv::RNG random(seed);
+    for (int i = 0; i < 6; ++i) {
+      const cv::Rect spot(random.uniform(0, 198), random.uniform(0, 18), random.uniform(1, 12), random.uniform(1, 12));
+      distance(spot & cv::Rect(0, 0, 200, 20)) += random.uniform(1, 20);
+    }
+    expect_reference_on_each_target(distance, {16, 5, 25});
+    expect_reference_on_each_target(distance, {16, 12, 25});  // 25 times faint is more than a byte
+  }
+}
+
+// All ways in which nine pixels may vote.
+TEST(CandidateKernel, EveryNeighbourhoodIsAMajorityOrNot) {
+  Arena arena;
+  const CandidateWorkspace work = CandidateWorkspace::create(512 * 4, 5, arena);
+  const BitMask mask = BitMask::create(512 * 4, 5, arena);
+  for (int votes = 0; votes < 512; ++votes) {
+    for (int i = 0; i < 9; ++i) work.candidates.set(4 * votes + i % 3 + 1, 1 + i / 3, (votes >> i & 1) != 0);
+  }
+  keep_majority(work, mask);
+  for (unsigned votes = 0; votes < 512; ++votes) {
+    EXPECT_EQ(mask.at(4 * static_cast<int>(votes) + 2, 2), std::popcount(votes) >= 5) << votes;
+  }
+}
+
 // Pixels that just are, and just are not, candidates: the definition worked by hand.
 TEST(CandidateKernel, LimitsAreInclusive) {
   on_each_target([] {
     const auto centre = [](const Plane& distance, const CandidateLimits& limits) {
-      return masks_of(distance, limits, mark_candidates, keep_majority).candidates(5, 50);
+      return masks_of(distance, limits, mark_candidates).candidates(5, 50);
     };
     Plane distance(11, 101, std::uint8_t{0});
     distance(5, 50) = 16;

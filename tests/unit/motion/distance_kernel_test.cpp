@@ -68,6 +68,7 @@ struct Rows {
   std::vector<std::uint16_t> mean[3];
   std::vector<std::uint16_t> deviation[3];
   std::vector<std::uint8_t> range;
+  mutable std::vector<std::uint8_t> shown[3];  ///< of the last distance
 
   Rows(std::size_t size, int most_deviation, int apart, unsigned seed)
       : range(random_row<std::uint8_t>(size, 0, 255, seed)) {
@@ -79,12 +80,14 @@ struct Rows {
             static_cast<std::uint16_t>(std::clamp(now[c][i] * 256 + static_cast<std::int16_t>(mean[c][i]), 0, 65535));
       }
       deviation[c] = random_row<std::uint16_t>(size, 0, most_deviation, seed + c + 7);
+      shown[c].assign(size + 1, 77);
     }
   }
 
   [[nodiscard]] DistanceRow view(bool colour, std::size_t from = 0) const {
     const auto row = [&](int c) {
-      return ChannelRow{now[c].data() + from, mean[c].data() + from, deviation[c].data() + from};
+      return ChannelRow{now[c].data() + from, mean[c].data() + from, deviation[c].data() + from,
+                        shown[c].data() + from};
     };
     return {row(0), colour ? row(1) : ChannelRow{}, colour ? row(2) : ChannelRow{}, range.data() + from};
   }
@@ -99,11 +102,15 @@ TEST(DistanceKernel, DistanceRowIsTheReferenceAtEveryLength) {
       in.noise_floor = 256;
       in.edge_percent = 75;
       auto expected = room_for<std::uint8_t>(width);
+      for (std::vector<std::uint8_t>& row : rows.shown) row.assign(row.size(), 77);
       distance_row_reference(in, width, expected.data());
+      const std::vector<std::uint8_t> shown[] = {rows.shown[0], rows.shown[1], rows.shown[2]};
       on_each_target([&] {
+        for (std::vector<std::uint8_t>& row : rows.shown) row.assign(row.size(), 77);
         auto got = room_for<std::uint8_t>(width);
         distance_row(in, width, got.data());
         EXPECT_EQ(got, expected) << width;
+        for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(rows.shown[c], shown[c]) << width << " channel " << c;
       });
     }
   }
@@ -159,10 +166,18 @@ TEST(DistanceKernel, EveryDivisorIsExactAroundItsMultiples) {
     ASSERT_GT(width, 40000);
     std::vector<std::uint8_t> expected(now.size());
     std::vector<std::uint8_t> got(now.size());
-    const ChannelRow sought{now.data(), mean.data(), deviation.data()};
-    const ChannelRow same{black.data(), dark.data(), deviation.data()};
+    std::vector<std::uint8_t> shown(now.size());
+    const ChannelRow sought{now.data(), mean.data(), deviation.data(), shown.data()};
+    // Other channels' divisors take part in the division: the same, and others up to the largest.
+    std::vector<std::uint16_t> other(deviation.rbegin(), deviation.rend());
+    const ChannelRow same{black.data(), dark.data(), deviation.data(), shown.data()};
+    const ChannelRow apart{black.data(), dark.data(), other.data(), shown.data()};
     for (const DistanceRow& rows : {DistanceRow{sought, {}, {}, ranges.data(), 256, floor, 75},
+                                    DistanceRow{sought, same, same, ranges.data(), 256, floor, 75},
+                                    DistanceRow{sought, apart, same, ranges.data(), 256, floor, 75},
                                     DistanceRow{same, sought, same, ranges.data(), 256, floor, 75},
+                                    DistanceRow{same, sought, apart, ranges.data(), 256, floor, 75},
+                                    DistanceRow{apart, same, sought, ranges.data(), 256, floor, 75},
                                     DistanceRow{same, same, sought, ranges.data(), 256, floor, 75}}) {
       distance_row_reference(rows, width, expected.data());
       on_each_target([&] {
@@ -171,6 +186,23 @@ TEST(DistanceKernel, EveryDivisorIsExactAroundItsMultiples) {
       });
     }
   }
+}
+
+TEST(DistanceKernel, EveryMeanIsShownRounded) {
+  Rows rows(65536, 1000, 100, 6);
+  for (std::size_t i = 0; i < 65536; ++i) {
+    rows.mean[1][i] = static_cast<std::uint16_t>(i);
+    rows.mean[2][i] = static_cast<std::uint16_t>(65535 - i);
+  }
+  std::vector<std::uint8_t> out(65536);
+  on_each_target([&] {
+    distance_row(rows.view(true), 65536, out.data());
+    for (std::size_t i = 0; i < 65536; ++i) {
+      const int rounded = std::min((static_cast<int>(i) + 128) / 256, 255);
+      ASSERT_EQ(rows.shown[1][i], rounded) << i;
+      ASSERT_EQ(rows.shown[2][65535 - i], rounded) << i;
+    }
+  });
 }
 
 TEST(DistanceKernel, ExtremeGainsAndDistancesAreTheReference) {
@@ -221,6 +253,26 @@ TEST(DistanceKernel, GainBinsAreTheReferenceAtEveryCountAndLeaveOutForeground) {
       EXPECT_EQ(got, expected) << count;
     });
   }
+}
+
+TEST(DistanceKernel, CountUpToIsTheReferenceAtEveryCountAndLimit) {
+  const auto values = random_row<std::uint16_t>(300, 0, 1024, 9);
+  for (const int count : kRowLengths) {
+    for (const int limit : {0, 1, 500, 1023, 1024, 65535}) {
+      const int expected = count_up_to_reference(values.data() + 1, count, limit);
+      on_each_target(
+          [&] { EXPECT_EQ(count_up_to(values.data() + 1, count, limit), expected) << count << " " << limit; });
+    }
+  }
+}
+
+TEST(DistanceKernel, CountUpToDoesNotOverflow) {
+  const std::vector<std::uint16_t> values(65536 * 64 + 70000, 65535);
+  const int count = static_cast<int>(values.size());
+  on_each_target([&] {
+    EXPECT_EQ(count_up_to(values.data(), count, 65535), count);
+    EXPECT_EQ(count_up_to(values.data(), count, 65534), 0);
+  });
 }
 
 }  // namespace

@@ -38,6 +38,20 @@ TEST(BitsKernel, EveryWidthIsTheDefinitionOnEachTarget) {
   }
 }
 
+TEST(BitsKernel, BitsFillTheRowTheyCameFromAndNothingBeyond) {
+  std::mt19937 engine(5);
+  for (const unsigned gaps : {1U, 2U, 200U}) {
+    for (int width = 0; width <= 330; ++width) {
+      std::vector<std::uint8_t> expected(static_cast<std::size_t>(width) + 1, 7);
+      for (int x = 0; x < width; ++x) expected[static_cast<std::size_t>(x)] = engine() % gaps == 0 ? 0 : 255;
+      const std::vector<std::uint64_t> words = bits_by_hand(expected.data(), width);
+      std::vector<std::uint8_t> got(expected.size(), 7);
+      fill_from_bits(words.data(), width, got.data());
+      EXPECT_EQ(got, expected) << width;
+    }
+  }
+}
+
 TEST(BitsKernel, RunsAreThoseOfThePixels) {
   std::mt19937 engine(4);
   for (const int width : {0, 1, 63, 64, 65, 128, 640, 2048, 2049, 5000}) {

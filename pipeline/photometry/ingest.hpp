@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+#include "pipeline/core/image_view.hpp"
+#include "pipeline/frame.hpp"
+#include "pipeline/photometry/ingest_kernel.hpp"
+
+namespace stereotrack {
+
+/// Where ingest_picture() writes: planes of one size. cb and cr empty where only luma is wanted.
+struct IngestPlanes {
+  ImageView<std::uint8_t> y;
+  ImageView<std::uint8_t> cb;
+  ImageView<std::uint8_t> cr;
+};
+/// The first stage: a picture as its source delivers it becomes planes, and each of its bytes is read exactly once,
+/// from the first to the last, as memory that a camera writes is slow to read.
+///     kGrey8          Y as it is; chroma is not written
+///     kBgr8           Y by (3.1), Cb by (3.18), Cr by (3.19): colour.hpp
+///     kYuyv, kUyvy    Y, Cb, Cr as they are; a pair's chroma is that of both its pixels
+///     kNv12           likewise; a square's chroma is that of its four pixels
+/// "As they are" in ITU-R BT.601 of whichever range the camera has; only full range is what kBgr8 gives.
+/// In: a picture whose size its format allows (frame.hpp). Out: planes of its size; without cb and cr, chroma that lies
+/// in rows of its own is not read. histogram: null, or how often each Y occurs, counted while the row is at hand.
+/// O(pixels), 0.1 ns a pixel, 0.4 with histogram; what bounds it is how fast the source can be read. Any thread, no
+/// state.
+void ingest_picture(const Picture& in, const IngestPlanes& out, Histogram* histogram) noexcept;
+
+}  // namespace stereotrack

@@ -1,0 +1,137 @@
+#include "pipeline/photometry/ingest_kernel.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "tests/support/each_target.hpp"
+
+namespace stereotrack {
+namespace {
+
+using test::kRowLengths;
+using test::on_each_target;
+using Row = std::vector<std::uint8_t>;
+
+Row random_row(std::size_t size, unsigned seed) {
+  std::mt19937 engine(seed);
+  Row row(size);
+  for (std::uint8_t& value : row) value = static_cast<std::uint8_t>(engine());
+  return row;
+}
+
+/// Rows of three planes, with one byte more, so that a write past their end is seen.
+struct Out {
+  explicit Out(int width) {
+    for (Row& row : rows) row.assign(static_cast<std::size_t>(width) + 1, 77);
+  }
+  PlaneRow colour() { return {rows[0].data(), rows[1].data(), rows[2].data()}; }
+  PlaneRow luma() { return {rows[0].data(), nullptr, nullptr}; }
+  bool operator==(const Out&) const = default;
+  Row rows[3];
+};
+
+TEST(IngestKernel, EveryColourIsTheReference) {
+  constexpr int kSize = 65536;
+  Row bgr(3 * kSize);
+  for (int b = 0; b < 256; ++b) {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      bgr[3 * i] = static_cast<std::uint8_t>(b);
+      bgr[3 * i + 1] = static_cast<std::uint8_t>(i);
+      bgr[3 * i + 2] = static_cast<std::uint8_t>(i >> 8);
+    }
+    Out expected(kSize);
+    bgr_row_reference(bgr.data(), kSize, expected.colour());
+    on_each_target([&] {
+      Out got(kSize);
+      bgr_row(bgr.data(), kSize, got.colour());
+      EXPECT_TRUE(got == expected) << "blue " << b;
+    });
+  }
+}
+
+// As `row` with each target, with and without chroma, against `reference`, at all lengths that are a multiple of
+// `step`.
+template <class Rows, class Reference>
+void expect_reference_at_every_length(int step, Rows&& row, Reference&& reference) {
+  const Row source = random_row(1000, 1);
+  for (const int width : kRowLengths) {
+    if (width % step != 0) continue;
+    for (const bool colour : {false, true}) {
+      Out expected(width);
+      reference(source.data() + 1, width, colour ? expected.colour() : expected.luma());
+      on_each_target([&] {
+        Out got(width);
+        row(source.data() + 1, width, colour ? got.colour() : got.luma());
+        EXPECT_TRUE(got == expected) << width << (colour ? " colour" : " luma");
+      });
+    }
+  }
+}
+
+TEST(IngestKernel, BgrRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  expect_reference_at_every_length(1, bgr_row, bgr_row_reference);
+}
+
+TEST(IngestKernel, CopiedRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  expect_reference_at_every_length(
+      1, [](const std::uint8_t* from, int width, const PlaneRow& out) { copy_row(from, width, out.y); },
+      [](const std::uint8_t* from, int width, const PlaneRow& out) { copy_row_reference(from, width, out.y); });
+}
+
+TEST(IngestKernel, PackedRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  for (const PackedOrder order : {PackedOrder::kLumaFirst, PackedOrder::kChromaFirst}) {
+    expect_reference_at_every_length(
+        2, [&](const std::uint8_t* from, int width, const PlaneRow& out) { packed_row(from, order, width, out); },
+        [&](const std::uint8_t* from, int width, const PlaneRow& out) {
+          packed_row_reference(from, order, width, out);
+        });
+  }
+}
+
+TEST(IngestKernel, ChromaPairsAreTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  const Row source = random_row(300, 2);
+  for (const int width : kRowLengths) {
+    if (width % 2 != 0) continue;
+    Out expected(width);
+    chroma_pairs_row_reference(source.data() + 1, width, expected.rows[1].data(), expected.rows[2].data());
+    on_each_target([&] {
+      Out got(width);
+      chroma_pairs_row(source.data() + 1, width, got.rows[1].data(), got.rows[2].data());
+      EXPECT_TRUE(got == expected) << width;
+    });
+  }
+}
+
+TEST(IngestKernel, PackedPairsByHand) {
+  on_each_target([] {
+    const Row pixels{10, 100, 11, 200, 12, 101, 13, 201};
+    Out out(4);
+    packed_row(pixels.data(), PackedOrder::kLumaFirst, 4, out.colour());
+    EXPECT_EQ(out.rows[0], (Row{10, 11, 12, 13, 77}));
+    EXPECT_EQ(out.rows[1], (Row{100, 100, 101, 101, 77}));
+    EXPECT_EQ(out.rows[2], (Row{200, 200, 201, 201, 77}));
+    packed_row(pixels.data(), PackedOrder::kChromaFirst, 4, out.colour());
+    EXPECT_EQ(out.rows[0], (Row{100, 200, 101, 201, 77}));
+    EXPECT_EQ(out.rows[1], (Row{10, 10, 12, 12, 77}));
+    EXPECT_EQ(out.rows[2], (Row{11, 11, 13, 13, 77}));
+    chroma_pairs_row(pixels.data(), 4, out.rows[1].data(), out.rows[2].data());
+    EXPECT_EQ(out.rows[1], (Row{10, 10, 11, 11, 77}));
+    EXPECT_EQ(out.rows[2], (Row{100, 100, 200, 200, 77}));
+  });
+}
+
+TEST(HistogramCounter, CountsEachPixelOfEveryLengthOnce) {
+  HistogramCounter counter;
+  Histogram expected{};
+  for (const int width : kRowLengths) {
+    const Row row = random_row(static_cast<std::size_t>(width) + 1, static_cast<unsigned>(width));
+    counter.add_row(row.data(), width);
+    for (int x = 0; x < width; ++x) ++expected[row[static_cast<std::size_t>(x)]];
+  }
+  EXPECT_EQ(counter.sum(), expected);
+}
+
+}  // namespace
+}  // namespace stereotrack
