@@ -316,9 +316,15 @@ void Pipeline::find_foreground() noexcept {
   } else {
     foreground_from_model();
   }
-  if (const auto blobs = blob_extractor_->run(left_.mask); blobs.has_value()) blobs_ = *blobs;
+  find_blobs(left_.mask);
   rejections_[static_cast<std::size_t>(Rejection::kSmall)] += static_cast<std::uint32_t>(blobs_.small);
-  rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] += static_cast<std::uint32_t>(blobs_.dropped_blobs);
+}
+
+// What found no room is counted, whichever part of the frame it was lost in.
+void Pipeline::find_blobs(ImageView<const std::uint8_t> mask) noexcept {
+  if (const auto blobs = blob_extractor_->run(mask); blobs.has_value()) blobs_ = *blobs;
+  rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] +=
+      static_cast<std::uint32_t>(blobs_.dropped_blobs) + static_cast<std::uint32_t>(blobs_.dropped_runs);
 }
 
 void Pipeline::foreground_from_edges() noexcept {
@@ -639,7 +645,7 @@ void Pipeline::remove_shadows() noexcept {
   }
   (void)opening_->run(left_.mask, scratch_);
   if (background_left_) (void)contour_fill_->run(scratch_, scratch_);
-  if (const auto blobs = blob_extractor_->run(scratch_); blobs.has_value()) blobs_ = *blobs;
+  find_blobs(scratch_);
   if (background_left_ && config_.shadow.method == ShadowMethod::kStereo) reject_background();
 }
 

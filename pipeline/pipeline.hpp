@@ -104,6 +104,7 @@ class Pipeline {
 
   void ingest(const FramePair& pair) noexcept;
   void find_foreground() noexcept;
+  void find_blobs(ImageView<const std::uint8_t> mask) noexcept;
   void foreground_from_edges() noexcept;
   void foreground_from_model() noexcept;
   void find_disparity() noexcept;

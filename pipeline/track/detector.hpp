@@ -23,7 +23,7 @@ enum class Rejection : std::uint8_t {
   kInconsistent,  ///< its disparities scatter too much to be one object
   kShadow,        ///< the shadow test left nothing of it
   kOwnSurface,    ///< its disparity is the background's own: light, a shadow or a mark
-  kNoRoom,        ///< more candidates than the detector holds
+  kNoRoom,        ///< more runs of the mask, blobs or candidates than there is room for
 };
 inline constexpr std::size_t kRejections = 6;
 [[nodiscard]] constexpr const char* to_string(Rejection why) noexcept {
