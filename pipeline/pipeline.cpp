@@ -45,6 +45,13 @@ Rect reach_of(const Prediction& target) noexcept {
   return {target.box.left - slack, target.box.top - slack, target.box.width + 2 * slack, target.box.height + 2 * slack};
 }
 
+// The nearest whole number, of a half the greater. std::floor() is a call where SSE4.1 is not taken for granted.
+int nearest(float value) noexcept {
+  const float up = value + 0.5F;
+  const int whole = static_cast<int>(up);
+  return static_cast<float>(whole) > up ? whole - 1 : whole;
+}
+
 void fill(ImageView<std::uint8_t> picture, std::uint8_t value) noexcept {
   for (int y = 0; y < picture.height; ++y) std::fill_n(picture.row(y), picture.width, value);
 }
@@ -249,7 +256,6 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
     old_disparity_ = arena.image<std::uint16_t>(width, height);
   }
   wanted_ = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
-  canvas_labels_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
   canvas_disparity_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
   disparity_ = arena.image<std::uint16_t>(width, height);
   memory_.charge(MemoryPart::kDisparity, arena);
@@ -341,9 +347,15 @@ void Pipeline::find_foreground() noexcept {
   } else {
     foreground_from_model();
   }
-  if (const auto blobs = blob_extractor_->run(left_.mask); blobs.has_value()) blobs_ = *blobs;
+  find_blobs(left_.mask);
   rejections_[static_cast<std::size_t>(Rejection::kSmall)] += static_cast<std::uint32_t>(blobs_.small);
-  rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] += static_cast<std::uint32_t>(blobs_.dropped_blobs);
+}
+
+// What found no room is counted, whichever part of the frame it was lost in.
+void Pipeline::find_blobs(ImageView<const std::uint8_t> mask) noexcept {
+  if (const auto blobs = blob_extractor_->run(mask); blobs.has_value()) blobs_ = *blobs;
+  rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] +=
+      static_cast<std::uint32_t>(blobs_.dropped_blobs) + static_cast<std::uint32_t>(blobs_.dropped_runs);
 }
 
 void Pipeline::foreground_from_edges() noexcept {
@@ -406,7 +418,8 @@ DisparityRange Pipeline::range_for(const Blob& blob) const noexcept {
   return {std::max(static_cast<int>(low), 0), std::min(static_cast<int>(high) + 1, full_range_)};
 }
 
-Rect Pipeline::paint_on_canvas(const Rect& box, std::uint16_t label) noexcept {
+// The part of the canvas in which a box of the raw left picture lies.
+Rect Pipeline::on_canvas(const Rect& box) const noexcept {
   const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
   double left = 1e9;
   double top = 1e9;
@@ -431,19 +444,8 @@ Rect Pipeline::paint_on_canvas(const Rect& box, std::uint16_t label) noexcept {
   if (right < left) return {};
   const int u = static_cast<int>(std::floor(left)) - 1;
   const int v = static_cast<int>(std::floor(top)) - 1;
-  const Rect roi =
-      intersect({u, v, static_cast<int>(std::ceil(right)) + 2 - u, static_cast<int>(std::ceil(bottom)) + 2 - v},
-                {0, 0, wanted_.width, wanted_.height});
-  const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
-  for (int y = roi.top; y < roi.bottom(); ++y) {
-    for (int x = roi.left; x < roi.right(); ++x) {
-      const Rectifier::Point16 p = raw.at(x, y);
-      const bool inside = p.valid() && blobs_.labels.at(p.x, p.y) == label;
-      wanted_.at(x, y) = inside ? 255 : 0;
-      canvas_labels_.at(x, y) = inside ? 1 : 0;
-    }
-  }
-  return roi;
+  return intersect({u, v, static_cast<int>(std::ceil(right)) + 2 - u, static_cast<int>(std::ceil(bottom)) + 2 - v},
+                   {0, 0, wanted_.width, wanted_.height});
 }
 
 // What of the right canvas the candidates of a part of the left one reach.
@@ -464,13 +466,13 @@ void Pipeline::run_matcher(LazyCanvas& left, LazyCanvas& right, const Rect& roi,
   }
 }
 
-// The region in canvas_labels_, all of its pixels together; right_moving may be an empty canvas. found: false where
+// The region that region_matcher_ has taken, inside roi; right_moving may be an empty canvas. found: false where
 // matching failed.
 RegionMatch Pipeline::match_region(LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving, const Rect& roi,
-                                   DisparityRange range) noexcept {
-  const Rect partners = grown(partners_of(roi, range), region_matcher_->config().row_tolerance);
-  const Result<RegionMatch> found = region_matcher_->run<std::uint16_t>(
-      left.with(roi), right.with(partners), canvas_labels_, 1, roi, range, right_moving.with(partners));
+                                   const RegionMatcher::Search& search) noexcept {
+  const Rect partners = grown(partners_of(roi, search.range), region_matcher_->config().row_tolerance);
+  const Result<RegionMatch> found =
+      region_matcher_->run(left.with(roi), right.with(partners), search, right_moving.with(partners));
   return found.has_value() ? *found : RegionMatch{};
 }
 
@@ -497,18 +499,26 @@ void Pipeline::renew_background_disparity() noexcept {
 }
 
 void Pipeline::match_blob(const Blob& blob) noexcept {
-  const Rect roi = paint_on_canvas(blob.box, blob.label);
+  const Rect roi = on_canvas(blob.box);
   if (roi.empty()) return;
   if (config_.disparity.mode == DisparityMode::kRegions) {
+    const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
+    for (int y = roi.top; y < roi.bottom(); ++y) {
+      const Rectifier::Point16* from = raw.row(y);
+      std::uint8_t* wanted = wanted_.row(y);
+      for (int x = roi.left; x < roi.right(); ++x) {
+        wanted[x] = from[x].valid() && blobs_.labels.at(from[x].x, from[x].y) == blob.label ? 255 : 0;
+      }
+    }
     fill(canvas_disparity_, roi, kNoDisparity);
     run_matcher(left_.canvas, right_.canvas, roi, range_for(blob), canvas_disparity_);
   }
   const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
   for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
     const Rectifier::PointF p = place.at(x, y);
-    const int u = static_cast<int>(std::floor(p.x + 0.5F));
-    const int v = static_cast<int>(std::floor(p.y + 0.5F));
-    const bool known = p.valid() && canvas_disparity_.contains(u, v);
+    const int u = p.valid() ? nearest(p.x) : -1;
+    const int v = p.valid() ? nearest(p.y) : -1;
+    const bool known = canvas_disparity_.contains(u, v);
     disparity_.at(x, y) = known ? canvas_disparity_.at(u, v) : kNoDisparity;
     if (background_right_) old_disparity_.at(x, y) = known ? canvas_background_.at(u, v) : kNoDisparity;
   });
@@ -544,20 +554,51 @@ ShadowTest::Input Pipeline::shadow_input() const noexcept {
           .disparity_background = old_disparity_};
 }
 
+// Where the region's disparity lies from the background's own; what ShadowTest::weigh() says of each pixel.
+ShadowTest::Evidence Pipeline::evidence_of(const Blob& blob) const noexcept {
+  ShadowTest::Evidence sum;
+  if (disparity_.empty() || old_disparity_.empty()) {
+    sum.unknown = blob.area;
+    return sum;
+  }
+  const int tolerance = static_cast<int>(config_.shadow.test.disparity_px * kDisparityScale);
+  for_each_run(blobs_.labels, blob.box, blob.label, [&](int y, int begin, int end) {
+    const std::uint16_t* now = disparity_.row(y);
+    const std::uint16_t* before = old_disparity_.row(y);
+    int known = 0;
+    int near = 0;
+    int behind = 0;
+    for (int x = begin; x < end; ++x) {
+      const int both = static_cast<int>(now[x] != kNoDisparity) & static_cast<int>(before[x] != kNoDisparity);
+      known += both;
+      near += both & static_cast<int>(now[x] - before[x] > tolerance);
+      behind += both & static_cast<int>(before[x] - now[x] > tolerance);
+    }
+    sum.near += near;
+    sum.behind += behind;
+    sum.own += known - near - behind;
+    sum.unknown += end - begin - known;
+  });
+  return sum;
+}
+
 void Pipeline::measure_strength() noexcept {
-  const ShadowTest::Input in = shadow_input();
   for (const Blob& blob : blobs_.blobs) {
-    std::array<std::int32_t, 256> histogram{};
-    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { ++histogram[left_.distance.at(x, y)]; });
+    // Neighbours are alike, and a count that has just been stored must be waited for: two tables in turns.
+    std::array<std::array<std::int32_t, 256>, 2> histogram{};
+    for_each_run(blobs_.labels, blob.box, blob.label, [&](int y, int begin, int end) {
+      const std::uint8_t* distance = left_.distance.row(y);
+      for (int x = begin; x < end; ++x) ++histogram[static_cast<std::size_t>(x & 1)][distance[x]];
+    });
     std::int32_t above = 0;
-    int level = 255;
-    while (level > 0 && (above + histogram[static_cast<std::size_t>(level)]) * 4 < blob.area) {
-      above += histogram[static_cast<std::size_t>(level)];
+    std::size_t level = 255;
+    const auto count = [&] { return histogram[0][level] + histogram[1][level]; };
+    while (level > 0 && (above + count()) * 4 < blob.area) {
+      above += count();
       --level;
     }
     typical_distance_[blob.label] = static_cast<std::uint8_t>(level);
-    ShadowTest::Evidence sum;
-    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { shadow_test_->weigh(in, x, y, sum); });
+    const ShadowTest::Evidence sum = evidence_of(blob);
     ghost_[blob.label] = sum.behind > sum.near ? 1 : 0;
   }
 }
@@ -585,8 +626,7 @@ void Pipeline::reject_background() noexcept {
                               .cr_background = in.cr_background,
                               .labels = in.labels};
   for (Blob& blob : blobs_.blobs) {
-    ShadowTest::Evidence sum;
-    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { shadow_test_->weigh(in, x, y, sum); });
+    const ShadowTest::Evidence sum = evidence_of(blob);
     const int known = sum.near + sum.own + sum.behind;
     const bool enough = known * 100 >= blob.area * kEvidencePercent;
     const bool behind = enough && sum.behind * 100 >= known * kVerdictPercent;
@@ -622,15 +662,20 @@ void Pipeline::remove_shadows() noexcept {
   }
   for (const Blob& blob : blobs_.blobs) {
     std::int32_t rest = 0;
-    for_each_pixel(blobs_.labels, blob.box, blob.label,
-                   [&](int x, int y) { rest += left_.mask.at(x, y) != 0 ? 1 : 0; });
+    for_each_run(blobs_.labels, blob.box, blob.label, [&](int y, int begin, int end) {
+      const std::uint8_t* mask = left_.mask.row(y);
+      int kept = 0;
+      for (int x = begin; x < end; ++x) kept += mask[x] != 0 ? 1 : 0;
+      rest += kept;
+    });
     if (rest * 100 >= blob.area * kShadowRestPercent) continue;
-    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) { left_.mask.at(x, y) = 0; });
+    for_each_run(blobs_.labels, blob.box, blob.label,
+                 [&](int y, int begin, int end) { std::fill(left_.mask.row(y) + begin, left_.mask.row(y) + end, 0); });
     if (blob.area > 0) ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];
   }
   (void)opening_->run(left_.mask, scratch_);
   if (background_left_) (void)contour_fill_->run(scratch_, scratch_);
-  if (const auto blobs = blob_extractor_->run(scratch_); blobs.has_value()) blobs_ = *blobs;
+  find_blobs(scratch_);
   if (background_left_ && config_.shadow.method == ShadowMethod::kStereo) reject_background();
 }
 
@@ -641,7 +686,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
   const bool small = candidate.area <= config_.disparity.small_px;
   const bool judges_surface = background_right_ && config_.shadow.method == ShadowMethod::kStereo;
   if (!sparse && !small && !judges_surface) return;
-  const Rect roi = paint_on_canvas(candidate.box, candidate.label);
+  const Rect roi = on_canvas(candidate.box);
   if (roi.empty()) return;
   LazyCanvas nowhere;
   DisparityRange range{0, full_range_};
@@ -653,58 +698,81 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
       range.max = std::clamp(static_cast<int>(target.disparity + room) + 1, range.min, full_range_);
     }
   }
+  bool taken = false;
   const auto match = [&](LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving) {
-    const RegionMatch found = match_region(left, right, right_moving, roi, range);
-    // Without a picture of what moves on the right, all of the region is said to fall on it.
-    return found.found && found.uniqueness >= kUnique && found.foreground_share >= 0.5 ? found : RegionMatch{};
+    if (!taken) {
+      const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
+      region_matcher_->take(roi, [&](int x, int y) {
+        const Rectifier::Point16 p = raw.at(x, y);
+        return p.valid() && blobs_.labels.at(p.x, p.y) == candidate.label;
+      });
+      taken = true;
+    }
+    return match_region(left, right, right_moving, roi, {.range = range, .enough_uniqueness = kUnique});
   };
+  // Without a picture of what moves on the right, all of the region is said to fall on it.
+  const auto sure = [](const RegionMatch& found) {
+    return found.found && found.uniqueness >= kUnique && found.foreground_share >= 0.5;
+  };
+  double cost = RegionMatcher::kAnyCost;
   if (sparse || small) {
     const RegionMatch now = match(left_.canvas, right_.canvas, right_moving_);
+    if (now.found) cost = now.look;  // fits_at() does not ask where it moves
     // What little is known pixel by pixel is better than a vague guess at the whole of a large region.
     const bool vague = now.sigma_px > std::max(kSurePart * now.disparity_px, 1.0);
-    if (now.found && (small || !vague || !candidate.has_depth)) {
+    if (sure(now) && (small || !vague || !candidate.has_depth)) {
       candidate.has_depth = true;
       candidate.disparity = now.disparity_px;
       candidate.disparity_sd = now.sigma_px;
       candidate.scatter = 0.5;
     }
   }
-  if (candidate.has_depth && judges_surface && resembles_background(candidate.box, candidate.label, candidate.area)) {
-    // What the same place of the background measures: pixel by pixel, or matched as a whole.
-    std::int64_t sum = 0;
-    int known = 0;
-    for_each_pixel(blobs_.labels, candidate.box, candidate.label, [&](int x, int y) {
-      if (old_disparity_.at(x, y) == kNoDisparity) return;
-      sum += old_disparity_.at(x, y);
-      ++known;
-    });
-    double before = -1;
-    if (known * 3 >= candidate.area) {
-      before = static_cast<double>(sum) / known / kDisparityScale;
-    } else if (const RegionMatch whole = match(left_.background_canvas, right_.background_canvas, nowhere);
-               whole.found) {
-      before = whole.disparity_px;
+  if (!candidate.has_depth || !judges_surface) return;
+  // What the same place of the background measures: pixel by pixel, or matched as a whole. The questions are put in
+  // the order of their price.
+  const auto resembles = [&] { return resembles_background(candidate.box, candidate.label, candidate.area); };
+  const double limit =
+      std::max(config_.shadow.own_depth_px, std::min(2.5 * candidate.disparity_sd, kSurePart * candidate.disparity));
+  std::int64_t sum = 0;
+  int known = 0;
+  for_each_run(blobs_.labels, candidate.box, candidate.label, [&](int y, int begin, int end) {
+    const std::uint16_t* old = old_disparity_.row(y);
+    std::uint32_t sum_of_run = 0;
+    int known_of_run = 0;
+    for (int x = begin; x < end; ++x) {
+      const bool is_known = old[x] != kNoDisparity;
+      sum_of_run += is_known ? old[x] : 0U;
+      known_of_run += is_known ? 1 : 0;
     }
-    const double limit =
-        std::max(config_.shadow.own_depth_px, std::min(2.5 * candidate.disparity_sd, kSurePart * candidate.disparity));
-    candidate.own_surface =
-        before >= 0 && (candidate.disparity - before <= limit || fits_at(before, roi, candidate.area));
+    sum += sum_of_run;
+    known += known_of_run;
+  });
+  if (known * 3 >= candidate.area) {
+    const double before = static_cast<double>(sum) / known / kDisparityScale;
+    const bool near = candidate.disparity - before <= limit;
+    candidate.own_surface = (near || (small && fits_at(before, roi, cost))) && resembles();
+  } else if (resembles()) {
+    const RegionMatch whole = match(left_.background_canvas, right_.background_canvas, nowhere);
+    if (!sure(whole)) return;
+    const double before = whole.disparity_px;
+    candidate.own_surface = candidate.disparity - before <= limit || (small && fits_at(before, roi, cost));
   }
 }
 
-// Whether the small region in canvas_labels_ matches about as well at this disparity as anywhere: lines along the rows
-// do, wherever they are.
-bool Pipeline::fits_at(double disparity, const Rect& roi, int area) noexcept {
-  if (area > config_.disparity.small_px) return false;
+// Whether the small region that region_matcher_ has taken matches about as well at this disparity as anywhere: lines
+// along the rows do, wherever they are. It is known to match somewhere at `cost` at most.
+bool Pipeline::fits_at(double disparity, const Rect& roi, double cost) noexcept {
   const int middle = static_cast<int>(disparity + 0.5);
   const DisparityRange near{std::max(middle - 1, 0), std::min(middle + 1, full_range_)};
   LazyCanvas nowhere;
-  const auto match = [&](DisparityRange range) {
-    return match_region(left_.canvas, right_.canvas, nowhere, roi, range);
+  const auto match = [&](const RegionMatcher::Search& search) {
+    return match_region(left_.canvas, right_.canvas, nowhere, roi, search);
   };
-  const RegionMatch here = match(near);
-  const RegionMatch anywhere = match({0, full_range_});
-  return here.found && anywhere.found && here.cost <= kUnique * std::max(anywhere.cost, kLeastCost);
+  const RegionMatch here =
+      match({.range = near, .most_cost = kUnique * std::max(cost, kLeastCost), .enough_uniqueness = 1});
+  if (!here.found) return false;
+  const RegionMatch anywhere = match({.range = {0, full_range_}, .enough_uniqueness = 1});
+  return anywhere.found && here.cost <= kUnique * std::max(anywhere.cost, kLeastCost);
 }
 
 // Half of the region's pixels look like the background under another light.

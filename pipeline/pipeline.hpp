@@ -109,6 +109,7 @@ class Pipeline {
 
   void ingest(const FramePair& pair) noexcept;
   void find_foreground() noexcept;
+  void find_blobs(ImageView<const std::uint8_t> mask) noexcept;
   void foreground_from_edges() noexcept;
   void foreground_from_model() noexcept;
   void find_disparity() noexcept;
@@ -118,21 +119,22 @@ class Pipeline {
   [[nodiscard]] bool is_explained(const Blob& blob) const noexcept;
   void reject_background() noexcept;
   void measure_strength() noexcept;
+  [[nodiscard]] ShadowTest::Evidence evidence_of(const Blob& blob) const noexcept;
   [[nodiscard]] bool resembles_background(const Rect& box, std::uint16_t label, int area) noexcept;
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
   void refine_blobs() noexcept;
   void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
-  [[nodiscard]] bool fits_at(double disparity, const Rect& roi, int area) noexcept;
+  [[nodiscard]] bool fits_at(double disparity, const Rect& roi, double cost) noexcept;
   void learn_background() noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
   [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;
-  [[nodiscard]] Rect paint_on_canvas(const Rect& box, std::uint16_t label) noexcept;
+  [[nodiscard]] Rect on_canvas(const Rect& box) const noexcept;
   [[nodiscard]] Rect partners_of(const Rect& part, DisparityRange range) const noexcept;
   void run_matcher(LazyCanvas& left, LazyCanvas& right, const Rect& roi, DisparityRange range,
                    ImageView<std::uint16_t> out) noexcept;
   [[nodiscard]] RegionMatch match_region(LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving, const Rect& roi,
-                                         DisparityRange range) noexcept;
+                                         const RegionMatcher::Search& search) noexcept;
 
   PipelineConfig config_;
   Setup setup_;
@@ -156,7 +158,6 @@ class Pipeline {
   ImageView<std::uint16_t> disparity_;      ///< raw left picture [1/16 px]
   ImageView<std::uint16_t> old_disparity_;  ///< the background's, raw left picture
   ImageView<std::uint8_t> wanted_;          ///< canvas: pixels to be matched
-  ImageView<std::uint16_t> canvas_labels_;
   ImageView<std::uint16_t> canvas_disparity_;
   ImageView<std::uint16_t> canvas_background_;  ///< background's disparity, renewed a strip of rows a frame
   int renewed_rows_ = 0;                        ///< of canvas_background_, since the background began

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include "pipeline/shape/bits_kernel.hpp"
 #include "pipeline/shape/region.hpp"
 
 namespace stereotrack {
@@ -52,11 +53,12 @@ Result<LevelSet> LevelSet::create(const Config& config, int width, int height, A
   stage.around_ = arena.array<std::uint8_t>(framed + sizeof(std::uint64_t));
   for (std::span<std::int8_t>& sums : stage.row_sums_) sums = arena.array<std::int8_t>(static_cast<std::size_t>(width));
   stage.feature_ = arena.array<std::uint8_t>(framed);
+  stage.marks_ = arena.array<std::uint8_t>(static_cast<std::size_t>(width));
   stage.queued_ = arena.array<std::uint8_t>(framed);
   stage.band_ = arena.array<std::int32_t>(framed);
   stage.next_band_ = arena.array<std::int32_t>(framed);
   if (stage.side_.empty() || stage.around_.empty() || stage.row_sums_.back().empty() || stage.feature_.empty() ||
-      stage.queued_.empty() || stage.band_.empty() || stage.next_band_.empty()) {
+      stage.marks_.empty() || stage.queued_.empty() || stage.band_.empty() || stage.next_band_.empty()) {
     return fail(Fault::kOutOfMemory);
   }
   return stage;
@@ -89,11 +91,13 @@ Result<LevelSet::Outcome> LevelSet::run(ImageView<const std::uint8_t> feature, I
   outcome.mean_in = static_cast<int>(in_.mean);
   outcome.mean_out = static_cast<int>(out_.mean);
 
+  const int width = domain_.width;
   for (int y = 0; y < domain_.height; ++y) {
     const std::int8_t* side = &side_[at(0, y)];
     std::uint16_t* row = labels.row(domain_.top + y) + domain_.left;
-    for (int x = 0; x < domain_.width; ++x) {
-      if (side[x] != kNone) row[x] = side[x] == kIn ? label : 0;
+    for (int x = 0; x < width; ++x) {
+      const std::uint16_t mine = side[x] == kIn ? label : std::uint16_t{0};
+      row[x] = side[x] == kNone ? row[x] : mine;
     }
   }
   outcome.blob = measure_region(labels, domain_, label);
@@ -111,61 +115,117 @@ void LevelSet::load(ImageView<const std::uint8_t> feature, ImageView<const std::
   out_ = {};
   parted_ = 0;
   next_size_ = 0;
+  visit_ = 1;
+  // Locals, which bytes written do not alias: else nothing is vectorised.
+  const int width = domain_.width;
+  const auto cap = static_cast<std::uint8_t>(config_.feature_cap);
   for (int y = 0; y < domain_.height; ++y) {
     const std::uint16_t* row = labels.row(domain_.top + y) + domain_.left;
     const std::uint8_t* from = feature.row(domain_.top + y) + domain_.left;
     std::int8_t* side = &side_[at(0, y)];
     std::uint8_t* values = &feature_[at(0, y)];
-    for (int x = 0; x < domain_.width; ++x)
-      values[x] = std::min(from[x], static_cast<std::uint8_t>(config_.feature_cap));
-    for (int x = 0; x < domain_.width; ++x) {
-      if (row[x] == label) {
-        side[x] = kIn;
-        in_.add(values[x], 1);
-      } else if (row[x] == 0) {
-        side[x] = kOut;
-        out_.add(values[x], 1);
-      }
+    for (int x = 0; x < width; ++x) values[x] = std::min(from[x], cap);
+    for (int x = 0; x < width; ++x)
+      side[x] = static_cast<std::int8_t>((row[x] == label ? 1 : 0) - (row[x] == 0 ? 1 : 0));
+    // A row's sums are at most 8192 times 255^2: 32 bits. A square takes 16.
+    std::array<std::int32_t, 6> sums{};
+    for (int x = 0; x < width; ++x) {
+      const std::uint16_t value = values[x];
+      const auto square = static_cast<std::uint16_t>(value * value);
+      const auto in = static_cast<std::uint16_t>(side[x] == kIn ? 0xFFFF : 0);
+      const auto out = static_cast<std::uint16_t>(side[x] == kOut ? 0xFFFF : 0);
+      sums[0] += in & 1;
+      sums[1] += value & in;
+      sums[2] += square & in;
+      sums[3] += out & 1;
+      sums[4] += value & out;
+      sums[5] += square & out;
     }
+    in_.add(sums[0], sums[1], sums[2]);
+    out_.add(sums[3], sums[4], sums[5]);
   }
   in_.renew_mean();
   out_.renew_mean();
   sum_discs();
-  for (int y = 0; y < domain_.height; ++y) {
-    for (int x = 0; x < domain_.width; ++x) {
-      if (on_contour(at(x, y))) queue(at(x, y));
-    }
+  for (int y = 0; y < domain_.height; ++y) queue_contour(y);
+}
+
+// Pixels of one row with a neighbour on the other side.
+void LevelSet::queue_contour(int y) noexcept {
+  const int width = domain_.width;
+  const std::int8_t* side = &side_[at(0, y)];
+  const std::int8_t* above = side - stride_;
+  const std::int8_t* below = side + stride_;
+  std::uint8_t* marks = marks_.data();
+  // 1 and -1, and no other two, differ in all bits but the lowest.
+  constexpr int kOpposite = 0xFE;
+  static_assert(((kIn ^ kOut) & 0xFF) == kOpposite);
+  for (int x = 0; x < width; ++x) {
+    const auto parts = [own = side[x]](std::int8_t other) {
+      return static_cast<std::uint8_t>(static_cast<std::uint8_t>(own ^ other) == kOpposite ? 1 : 0);
+    };
+    marks[x] = static_cast<std::uint8_t>(parts(side[x - 1]) | parts(side[x + 1]) | parts(above[x]) | parts(below[x]));
   }
+  for_each_set_run(marks, width, [&](int begin, int end) {
+    for (int x = begin; x < end; ++x) {
+      queued_[at(x, y)] = visit_;
+      next_band_[next_size_++] = at(x, y);
+    }
+  });
 }
 
 int LevelSet::sweep() noexcept {
   std::swap(band_, next_band_);
   const std::int32_t band_size = next_size_;
-  next_size_ = 0;
-  for (std::int32_t i = 0; i < band_size; ++i) queued_[band_[i]] = 0;
+  if (visit_ == UINT8_MAX) {
+    std::fill_n(queued_.begin(), stride_ * (domain_.height + 2 * kReach), std::uint8_t{0});
+    visit_ = 0;
+  }
+  ++visit_;
 
   // (I - c_out)^2 - (I - c_in)^2: what belonging inside is worth.
   const std::int64_t span = out_.mean - in_.mean;
   const std::int64_t sum = out_.mean + in_.mean;
   const auto worth = [span, sum](int value) { return span * (sum - 512 * value); };
 
+  // Locals, which bytes written do not alias: the members would be read again after each.
+  const std::int64_t weight = pair_weight();
+  const std::int32_t stride = stride_;
+  const std::uint8_t visit = visit_;
+  std::int8_t* const sides = side_.data();
+  std::uint8_t* const queued = queued_.data();
+  const std::uint8_t* const around = around_.data();
+  const std::uint8_t* const values = feature_.data();
+  const std::int32_t* const band = band_.data();
+  std::int32_t* next = next_band_.data();
+  const auto queue = [&next, queued, visit](std::int32_t p) {
+    if (queued[p] == visit) return;
+    queued[p] = visit;
+    *next++ = p;
+  };
   int changed = 0;
   for (std::int32_t i = 0; i < band_size; ++i) {
-    const std::int32_t p = band_[i];
-    if (!on_contour(p)) continue;
+    const std::int32_t p = band[i];
+    const int side = sides[p];
+    const int other = -side;
+    if (sides[p - 1] != other && sides[p + 1] != other && sides[p - stride] != other && sides[p + stride] != other) {
+      continue;
+    }
     queue(p);
-    const std::int8_t side = side_[p];
-    const std::uint8_t value = feature_[p];
+    const std::uint8_t value = values[p];
     // Neighbours on its side are parted from it, those on the other joined.
-    const int parted = side * (around_[p] - kNoSum - side);
-    if (side * worth(value) + pair_weight() * parted >= 0) continue;
-    in_.add(value, -side);
-    out_.add(value, side);
+    const int parted = side * (around[p] - kNoSum - side);
+    if (side * worth(value) + weight * parted >= 0) continue;
+    in_.add(-side, -side * value, -side * value * value);
+    out_.add(side, side * value, side * value * value);
     parted_ += parted;
     flip(p);
     ++changed;
-    for (const std::int32_t neighbour : {p - stride_, p - 1, p + 1, p + stride_}) queue(neighbour);
+    for (const std::int32_t neighbour : {p - stride, p - 1, p + 1, p + stride}) {
+      if (sides[neighbour] != kNone) queue(neighbour);
+    }
   }
+  next_size_ = static_cast<std::int32_t>(next - next_band_.data());
   return changed;
 }
 
@@ -204,18 +264,6 @@ void LevelSet::flip(std::int32_t p) noexcept {
     std::memcpy(row, &eight, sizeof eight);
     row += stride_;
   }
-}
-
-bool LevelSet::on_contour(std::int32_t p) const noexcept {
-  const int other = -side_[p];
-  return other != kNone &&
-         (side_[p - 1] == other || side_[p + 1] == other || side_[p - stride_] == other || side_[p + stride_] == other);
-}
-
-void LevelSet::queue(std::int32_t p) noexcept {
-  if (side_[p] == kNone || queued_[p] != 0) return;
-  queued_[p] = 1;
-  next_band_[next_size_++] = p;
 }
 
 std::int64_t LevelSet::pair_weight() const noexcept {

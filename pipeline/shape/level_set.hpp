@@ -71,10 +71,10 @@ class LevelSet {
     std::int64_t sum_squares = 0;
     std::int64_t mean = 0;  ///< [grey level / 256]
 
-    void add(int value, int sign) noexcept {
-      count += sign;
-      sum += sign * value;
-      sum_squares += sign * value * value;
+    void add(int pixels, int values, int squares) noexcept {
+      count += pixels;
+      sum += values;
+      sum_squares += squares;
     }
     void renew_mean() noexcept {
       if (count > 0) mean = (512 * sum + count) / (2 * count);
@@ -88,8 +88,7 @@ class LevelSet {
   [[nodiscard]] int sweep() noexcept;  // how many pixels changed sides
   void sum_discs() noexcept;
   void flip(std::int32_t p) noexcept;
-  [[nodiscard]] bool on_contour(std::int32_t p) const noexcept;
-  void queue(std::int32_t p) noexcept;
+  void queue_contour(int y) noexcept;
   [[nodiscard]] std::int64_t pair_weight() const noexcept;  // of a parted pair [grey^2 / 65536]
   [[nodiscard]] std::int32_t at(int x, int y) const noexcept;
 
@@ -106,10 +105,12 @@ class LevelSet {
   std::span<std::uint8_t> around_;  // sum of side_ over the disc of pairs, its middle included, from kNoSum up
   std::array<std::span<std::int8_t>, 3> row_sums_;  // of a row of side_, over 3, 5 and 7 pixels
   std::span<std::uint8_t> feature_;
-  std::span<std::uint8_t> queued_;
+  std::span<std::uint8_t> marks_;   // of one row: on the contour?
+  std::span<std::uint8_t> queued_;  // the last visit for which a pixel was queued
   std::span<std::int32_t> band_;
   std::span<std::int32_t> next_band_;
   std::int32_t next_size_ = 0;
+  std::uint8_t visit_ = 0;
 };
 static_assert(RealTimeStage<LevelSet, &LevelSet::run>);
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <cstring>
 
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/rect.hpp"
@@ -19,16 +21,21 @@ namespace stereotrack {
                                    (box.bottom() >= height ? kBottomSide : 0));
 }
 
-/// Calls fn(x, y) for each pixel of the region, in raster order. O(box).
-template <class Fn>
-void for_each_pixel(ImageView<const std::uint16_t> labels, const Rect& box, std::uint16_t label, Fn&& fn) noexcept {
-  const Rect part = intersect(box, {0, 0, labels.width, labels.height});
-  for (int y = part.top; y < part.bottom(); ++y) {
-    const std::uint16_t* row = labels.row(y);
-    for (int x = part.left; x < part.right(); ++x) {
-      if (row[x] == label) fn(x, y);
-    }
+/// The first of the labels [x, end) that is `label`, or that is not; four at a time.
+template <bool kSame>
+[[nodiscard]] inline int find_label(const std::uint16_t* row, int x, int end, std::uint16_t label) noexcept {
+  static_assert(std::endian::native == std::endian::little, "the first label must be a word's lowest");
+  constexpr std::uint64_t kOnes = 0x0001'0001'0001'0001U;
+  for (; x + 4 <= end; x += 4) {
+    std::uint64_t labels;
+    std::memcpy(&labels, row + x, sizeof labels);
+    std::uint64_t found = labels ^ (kOnes * label);  // 0 where it is the label
+    // The lowest of the top bits is right; those above may be a borrow's.
+    if (kSame) found = (found - kOnes) & ~found & (kOnes << 15);
+    if (found != 0) return x + std::countr_zero(found) / 16;
   }
+  while (x < end && (row[x] == label) != kSame) ++x;
+  return x;
 }
 
 /// Calls fn(y, begin, end) for each run of the region's pixels in a row, in raster order. O(box).
@@ -37,13 +44,21 @@ void for_each_run(ImageView<const std::uint16_t> labels, const Rect& box, std::u
   const Rect part = intersect(box, {0, 0, labels.width, labels.height});
   for (int y = part.top; y < part.bottom(); ++y) {
     const std::uint16_t* row = labels.row(y);
-    for (int x = part.left; x < part.right(); ++x) {
-      if (row[x] != label) continue;
-      const int begin = x;
-      while (x < part.right() && row[x] == label) ++x;
-      fn(y, begin, x);
+    for (int end = part.left;;) {
+      const int begin = find_label<true>(row, end, part.right(), label);
+      if (begin >= part.right()) break;
+      end = find_label<false>(row, begin, part.right(), label);
+      fn(y, begin, end);
     }
   }
+}
+
+/// Calls fn(x, y) for each pixel of the region, in raster order. fn may change the label of its pixel. O(box).
+template <class Fn>
+void for_each_pixel(ImageView<const std::uint16_t> labels, const Rect& box, std::uint16_t label, Fn&& fn) noexcept {
+  for_each_run(labels, box, label, [&](int y, int begin, int end) noexcept {
+    for (int x = begin; x < end; ++x) fn(x, y);
+  });
 }
 
 /// 255 where a pixel has a label, else 0. Sizes must agree. O(pixels).
@@ -102,7 +117,8 @@ void for_each_boundary_pixel(ImageView<const std::uint16_t> labels, const Rect& 
 /// Gives the region's pixels the label `to`: to merge blobs, or with to = 0 to remove one. O(box).
 inline void relabel_region(ImageView<std::uint16_t> labels, const Rect& box, std::uint16_t from,
                            std::uint16_t to) noexcept {
-  for_each_pixel(labels, box, from, [&](int x, int y) noexcept { labels.at(x, y) = to; });
+  for_each_run(labels, box, from,
+               [&](int y, int begin, int end) noexcept { std::fill(labels.row(y) + begin, labels.row(y) + end, to); });
 }
 
 }  // namespace stereotrack

@@ -14,30 +14,33 @@
 namespace stereotrack {
 namespace {
 
-constexpr int kStep = 16;  ///< lanes that are summed together
-
-/// Sums of lanes [first, first + kStep).
+/// Sums of the lanes of one step.
 struct StepSums {
-  alignas(64) std::int32_t differences[kStep] = {};
-  alignas(64) std::int32_t squares[kStep] = {};
-  alignas(64) std::int32_t moving[kStep] = {};
-  alignas(64) std::int32_t pixels[kStep] = {};
+  alignas(64) std::int32_t differences[kRegionStep] = {};
+  alignas(64) std::int32_t squares[kRegionStep] = {};
+  alignas(64) std::int32_t moving[kRegionStep] = {};
+  alignas(64) std::int32_t pixels[kRegionStep] = {};
 };
 
-/// A sample that may meet no pixel in some of the lanes.
-[[maybe_unused]] void add_clipped(const RegionTask& task, const RegionSample& sample, int first,
+/// A sample that may meet no pixel in some of the lanes [first, first + count).
+[[maybe_unused]] void add_clipped(const RegionTask& task, const RegionSample& sample, int first, int count,
                                   StepSums& sums) noexcept {
   const int y = sample.y + task.row_offset;
   if (y < 0 || y >= task.right.height) return;
   const int column = sample.x + task.shift + first;
-  const int end = std::min(kStep, task.right.width - column);
-  for (int i = std::max(-column, 0); i < end; ++i) {
-    const int difference = sample.grey - task.right.at(column + i, y);
+  const int begin = std::max(-column, 0);
+  const int end = std::min(count, task.right.width - column);
+  if (begin >= end) return;
+  const std::uint8_t* partners = task.right.row(y) + column + begin;
+  const std::uint8_t* moves = task.moving.empty() ? nullptr : task.moving.row(y) + column + begin;
+  for (int i = begin; i < end; ++i) {
+    const int difference = sample.grey - partners[i - begin];
     sums.differences[i] += difference;
     sums.squares[i] += difference * difference;
     sums.pixels[i] += 1;
-    if (!task.moving.empty() && task.moving.at(column + i, y) != 0) ++sums.moving[i];
   }
+  if (moves == nullptr) return;
+  for (int i = begin; i < end; ++i) sums.moving[i] += moves[i - begin] != 0 ? 1 : 0;
 }
 
 }  // namespace
@@ -57,50 +60,49 @@ void sums_of(const RegionTask& task, const RegionSums& sums) { region_sums_refer
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr hn::CappedTag<std::int16_t, kStep> kWords{};
-constexpr hn::Rebind<std::uint8_t, hn::CappedTag<std::int16_t, kStep> > kBytes{};
-constexpr hn::RepartitionToWide<hn::CappedTag<std::uint16_t, kStep> > kSums{};
-constexpr int kLanes = static_cast<int>(hn::MaxLanes(kWords));
-constexpr int kVectors = kStep / kLanes;
 // So many samples' differences, each at most 255, are summed up in 16 bits; and counts in 8.
 constexpr int kMostInWords = 128;
+constexpr int kHalfStep = kRegionStep / 2;
+constexpr hn::CappedTag<std::int16_t, kHalfStep> kWords{};
+constexpr hn::Rebind<std::uint8_t, hn::CappedTag<std::int16_t, kHalfStep> > kBytes{};
+constexpr hn::RepartitionToWide<hn::CappedTag<std::uint16_t, kHalfStep> > kSums{};
+constexpr int kLanes = static_cast<int>(hn::MaxLanes(kWords));
 
-/// What has come together of at most kMostInWords samples is added to the sums and forgotten.
-template <class V16, class V8>
-void flush(V16* differences, V8* moving, StepSums& sums) {
-  alignas(64) std::int16_t words[kStep];
-  alignas(64) std::uint8_t bytes[kStep];
+/// What has come together of `count` samples, at most kMostInWords, is added to the sums and forgotten. still: how many
+/// do not move.
+template <int kVectors, bool kMoving, class V16, class V8>
+void flush(V16* differences, V8* still, int count, StepSums& sums) {
+  alignas(64) std::int16_t words[kRegionStep];
+  alignas(64) std::uint8_t bytes[kRegionStep];
   for (int k = 0; k < kVectors; ++k) {
     hn::Store(differences[k], kWords, words + k * kLanes);
-    hn::Store(moving[k], kBytes, bytes + k * kLanes);
+    hn::Store(still[k], kBytes, bytes + k * kLanes);
     differences[k] = hn::Zero(kWords);
-    moving[k] = hn::Zero(kBytes);
+    still[k] = hn::Zero(kBytes);
   }
-  for (int i = 0; i < kStep; ++i) {
-    sums.differences[i] += words[i];
-    sums.moving[i] += bytes[i];
-  }
+  for (int i = 0; i < kVectors * kLanes; ++i) sums.differences[i] += words[i];
+  for (int i = 0; kMoving && i < kVectors * kLanes; ++i) sums.moving[i] += count - bytes[i];
 }
 
-template <bool kMoving>
+template <int kVectors, bool kMoving, bool kInside>
 void sum_step(const RegionTask& task, int first, StepSums& sums) {
   hn::Vec<decltype(kWords)> differences[kVectors];
-  hn::Vec<decltype(kBytes)> moving[kVectors];
-  hn::Vec<decltype(kSums)> even[kVectors];
+  hn::Vec<decltype(kBytes)> still[kVectors];
+  hn::Vec<decltype(kSums)> pairs[kVectors];  // even lanes, and 2^16 times the odd ones
   hn::Vec<decltype(kSums)> odd[kVectors];
   for (int k = 0; k < kVectors; ++k) {
     differences[k] = hn::Zero(kWords);
-    moving[k] = hn::Zero(kBytes);
-    even[k] = odd[k] = hn::Zero(kSums);
+    still[k] = hn::Zero(kBytes);
+    pairs[k] = odd[k] = hn::Zero(kSums);
   }
-  const int last_column = task.right.width - kStep;
+  const int last_column = task.right.width - kVectors * kLanes;
   int whole = 0;
   int gathered = 0;
   for (const RegionSample& sample : task.samples) {
     const int y = sample.y + task.row_offset;
     const int column = sample.x + task.shift + first;
-    if (y < 0 || y >= task.right.height || column < 0 || column > last_column) {
-      add_clipped(task, sample, first, sums);
+    if (!kInside && (y < 0 || y >= task.right.height || column < 0 || column > last_column)) {
+      add_clipped(task, sample, first, kVectors * kLanes, sums);
       continue;
     }
     const auto grey = hn::Set(kWords, sample.grey);
@@ -110,51 +112,66 @@ void sum_step(const RegionTask& task, int first, StepSums& sums) {
       differences[k] = hn::Add(differences[k], difference);
       // At most 255^2 < 2^16.
       const auto squares = hn::BitCast(kSums, hn::Mul(difference, difference));
-      even[k] = hn::Add(even[k], hn::And(squares, hn::Set(kSums, 0xFFFFU)));
+      pairs[k] = hn::Add(pairs[k], squares);
       odd[k] = hn::Add(odd[k], hn::ShiftRight<16>(squares));
     }
     if (kMoving) {
       const std::uint8_t* moves = task.moving.row(y) + column;
       for (int k = 0; k < kVectors; ++k) {
         // A mask of ones is -1.
-        const auto set = hn::Ne(hn::LoadU(kBytes, moves + k * kLanes), hn::Zero(kBytes));
-        moving[k] = hn::Sub(moving[k], hn::VecFromMask(kBytes, set));
+        const auto none = hn::Eq(hn::LoadU(kBytes, moves + k * kLanes), hn::Zero(kBytes));
+        still[k] = hn::Sub(still[k], hn::VecFromMask(kBytes, none));
       }
     }
     ++whole;
     if (++gathered == kMostInWords) {
-      flush(differences, moving, sums);
+      flush<kVectors, kMoving>(differences, still, gathered, sums);
       gathered = 0;
     }
   }
-  flush(differences, moving, sums);
+  flush<kVectors, kMoving>(differences, still, gathered, sums);
   for (int k = 0; k < kVectors; ++k) {
-    alignas(64) std::uint32_t even_sums[kLanes / 2];
+    alignas(64) std::uint32_t pair_sums[kLanes / 2];
     alignas(64) std::uint32_t odd_sums[kLanes / 2];
-    hn::Store(even[k], kSums, even_sums);
+    hn::Store(pairs[k], kSums, pair_sums);
     hn::Store(odd[k], kSums, odd_sums);
     for (int i = 0; i < kLanes / 2; ++i) {
-      sums.squares[k * kLanes + 2 * i] += static_cast<std::int32_t>(even_sums[i]);
+      // Modulo 2^32, as the sums of pairs are; the squares' sums are less.
+      sums.squares[k * kLanes + 2 * i] += static_cast<std::int32_t>(pair_sums[i] - (odd_sums[i] << 16));
       sums.squares[k * kLanes + 2 * i + 1] += static_cast<std::int32_t>(odd_sums[i]);
     }
   }
-  for (int& pixels : sums.pixels) pixels += whole;
+  for (int i = 0; i < kVectors * kLanes; ++i) sums.pixels[i] += whole;
+}
+
+template <int kVectors>
+void sum_lanes(const RegionTask& task, int first, StepSums& sums) {
+  if (task.moving.empty()) {
+    task.inside ? sum_step<kVectors, false, true>(task, first, sums)
+                : sum_step<kVectors, false, false>(task, first, sums);
+  } else {
+    task.inside ? sum_step<kVectors, true, true>(task, first, sums)
+                : sum_step<kVectors, true, false>(task, first, sums);
+  }
 }
 
 void sums_of(const RegionTask& task, const RegionSums& sums) {
-  if (task.lanes < kStep) return region_sums_reference(task, sums);
-  for (int next = 0; next < task.lanes; next += kStep) {
-    const int first = std::min(next, task.lanes - kStep);  // the last step overlaps the one before it
+  for (int first = 0; first < task.lanes; first += kRegionStep) {
+    const int count = std::min(kRegionStep, task.lanes - first);
     StepSums step;
-    if (task.moving.empty()) {
-      sum_step<false>(task, first, step);
+    if (count > kHalfStep) {
+      sum_lanes<kRegionStep / kLanes>(task, first, step);
     } else {
-      sum_step<true>(task, first, step);
+      sum_lanes<kHalfStep / kLanes>(task, first, step);
     }
-    std::copy_n(step.differences, kStep, sums.differences.data() + first);
-    std::copy_n(step.squares, kStep, sums.squares.data() + first);
-    std::copy_n(step.moving, kStep, sums.moving.data() + first);
-    std::copy_n(step.pixels, kStep, sums.pixels.data() + first);
+    // What the last step has beyond the lanes that were asked for is dropped.
+    for (int i = 0; i < count; ++i) {
+      const auto lane = static_cast<std::size_t>(first + i);
+      sums.differences[lane] += step.differences[i];
+      sums.squares[lane] += step.squares[i];
+      sums.moving[lane] += step.moving[i];
+      sums.pixels[lane] += step.pixels[i];
+    }
   }
 }
 
@@ -176,9 +193,6 @@ HWY_EXPORT(sums_of);
 }  // namespace
 
 void region_sums_reference(const RegionTask& task, const RegionSums& sums) noexcept {
-  for (const std::span<std::int32_t>& all : {sums.differences, sums.squares, sums.moving, sums.pixels}) {
-    std::fill_n(all.data(), task.lanes, 0);
-  }
   for (const RegionSample& sample : task.samples) {
     for (int i = 0; i < task.lanes; ++i) {
       const int x = sample.x + task.shift + i;

@@ -17,6 +17,7 @@ struct RegionMatch {
   double disparity_px = 0;      ///< sub-pixel
   double sigma_px = 0;          ///< standard deviation of disparity_px
   double cost = 0;              ///< E of the best candidate [grey levels squared]
+  double look = 0;              ///< of that, what is not for pixels beside the right foreground: its A, bent
   double uniqueness = 0;        ///< E of the best candidate elsewhere / E of the best, >= 1; 1 = no evidence
   double foreground_share = 1;  ///< of the region's pixels, how many fall on right foreground
   int row_offset = 0;           ///< right row - left row
@@ -42,13 +43,17 @@ struct RegionMatch {
 /// and at most half the region's width; where d* is an end of what exists, 1 px.
 /// uniqueness: smallest E further than max(2, half the region's width) from d*, over max(E*, noise^2).
 ///
-/// In: rectified greys, 0..255; labels of the left picture's size, the region = pixels of `rect` that carry
-/// `label`; `right_foreground` of the right picture's size (0 = background) or empty. Disparities as in
-/// disparity.hpp. An empty region or one without candidates is no fault: found = false.
+/// Not all of it is summed up: e^2 over some of the pixels bounds A from below, and a place of which that is over what
+/// counts is left. What counts: E up to enough_uniqueness max(E*, noise^2), and up to most_cost; so the results are
+/// those of the whole sum.
+///
+/// In: rectified greys, 0..255; the region: pixels of the left picture, all of them take()n before a run() or, as
+/// pixels of `rect` that carry `label`, by it; `right_foreground` of the right picture's size (0 = background) or
+/// empty. Disparities as in disparity.hpp. An empty region or one without candidates is no fault: found = false.
 /// Faults: kBadConfig, kOutOfMemory at create(); kBadSize, kBadConfig (range over the stated maximum) at run.
-/// Cost: O(min(region, largest_sample) x range x (2 row_tolerance + 1)): a larger region is sampled on a grid,
-/// so that one huge object costs no more than a small one. Memory: 32 (1 + row_tolerance) bytes x largest range. One
-/// instance a thread.
+/// Cost: O(min(region, largest_sample) x range x (2 row_tolerance + 1)) at most, and a tenth of it for what has
+/// texture; a larger region is sampled on a grid, so that one huge object costs no more than a small one. Memory: 32
+/// bytes x (2 row_tolerance + 1) x largest range. One instance a thread.
 class RegionMatcher {
  public:
   struct Config {
@@ -66,35 +71,69 @@ class RegionMatcher {
     double sigma_floor_px = 0.2;     ///< 0.01..10 [px]
   };
 
+  struct Search {
+    DisparityRange range;
+    double most_cost = kAnyCost;          ///< found: false where even the best E is over it
+    double enough_uniqueness = kAnyCost;  ///< a larger uniqueness is told as this, >= 1
+  };
+  static constexpr double kAnyCost = 1e12;
+
   [[nodiscard]] const Config& config() const noexcept { return config_; }
 
   [[nodiscard]] static Result<RegionMatcher> create(const Config& config, Arena& arena) noexcept;
 
+  /// The region: those pixels of `rect`, which must lie in the left picture, for which inside(x, y).
+  template <class Inside>
+  void take(const Rect& rect, Inside&& inside) noexcept {
+    for (int step = 1; !collect(rect, step, inside); ++step) {
+    }
+    spread();
+  }
+
+  /// Matches the region that was taken last, of which `left` gives the greys.
+  [[nodiscard]] Result<RegionMatch> run(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                        const Search& search, ImageView<const std::uint8_t> right_foreground) noexcept {
+    if (const auto fault = check(left, right, search.range, right_foreground)) return fail(*fault);
+    read_greys(left);
+    return best_match(right, search, right_foreground);
+  }
+
   template <class Label>
   [[nodiscard]] Result<RegionMatch> run(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                        ImageView<const Label> labels, Label label, Rect rect, DisparityRange range,
-                                        ImageView<const std::uint8_t> right_foreground) noexcept {
+                                        ImageView<const Label> labels, Label label, const Rect& rect,
+                                        DisparityRange range, ImageView<const std::uint8_t> right_foreground) noexcept {
     if (!labels.same_size(left)) return fail(Fault::kBadSize);
-    rect = intersect(rect, {0, 0, labels.width, labels.height});
     if (const auto fault = check(left, right, range, right_foreground)) return fail(*fault);
-    for (int step = 1; !collect(left, labels, label, rect, step); ++step) {
-    }
-    return best_match(right, range, right_foreground);
+    take(intersect(rect, {0, 0, labels.width, labels.height}),
+         [&](int x, int y) noexcept { return labels.at(x, y) == label; });
+    return run(left, right, {.range = range}, right_foreground);
   }
 
  private:
   RegionMatcher() noexcept = default;
 
+  /// One task's constants.
+  struct Task {
+    ImageView<const std::uint8_t> right;
+    ImageView<const std::uint8_t> moving;
+    Search search;
+    int lanes = 0;
+    int steps = 0;          ///< of kRegionStep lanes, a row of places
+    int first_inside = 0;   ///< lanes [first_inside, end_inside): all pixels meet one, as far as columns matter
+    int end_inside = 0;     ///< may lie beyond the last lane
+    int first_touched = 0;  ///< lanes [first_touched, end_touched): some may
+    int end_touched = 0;
+  };
+
   /// Every step-th pixel of every step-th row; false if they are more than the sample holds.
-  template <class Label>
-  [[nodiscard]] bool collect(ImageView<const std::uint8_t> left, ImageView<const Label> labels, Label label, Rect rect,
-                             int step) noexcept {
+  template <class Inside>
+  [[nodiscard]] bool collect(const Rect& rect, int step, Inside& inside) noexcept {
     sample_size_ = 0;
     for (int y = rect.top; y < rect.bottom(); y += step) {
       for (int x = rect.left; x < rect.right(); x += step) {
-        if (labels.at(x, y) != label) continue;
+        if (!inside(x, y)) continue;
         if (sample_size_ == config_.largest_sample) return false;
-        samples_[sample_size_] = {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), left.at(x, y)};
+        found_[sample_size_] = {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), 0};
         ++sample_size_;
       }
     }
@@ -104,16 +143,29 @@ class RegionMatcher {
   [[nodiscard]] std::optional<Fault> check(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
                                            DisparityRange range,
                                            ImageView<const std::uint8_t> right_foreground) const noexcept;
-  [[nodiscard]] RegionMatch best_match(ImageView<const std::uint8_t> right, DisparityRange range,
+  void spread() noexcept;
+  void read_greys(ImageView<const std::uint8_t> left) noexcept;
+  [[nodiscard]] RegionMatch best_match(ImageView<const std::uint8_t> right, const Search& search,
                                        ImageView<const std::uint8_t> right_foreground) noexcept;
-  void score_row_offset(ImageView<const std::uint8_t> right, ImageView<const std::uint8_t> right_foreground,
-                        DisparityRange range, int row_offset, double* scores, double* shares) noexcept;
+  [[nodiscard]] Task task_of(ImageView<const std::uint8_t> right, const Search& search,
+                             ImageView<const std::uint8_t> right_foreground) const noexcept;
+  [[nodiscard]] std::size_t first_lane(const Task& task, int row, int step) const noexcept;
+  [[nodiscard]] int summed(const Task& task, int row, int step) const noexcept;
+  void sum_up(const Task& task, int row, int step, int until) noexcept;
+  [[nodiscard]] bool rows_inside(const Task& task, int row) const noexcept;
+  [[nodiscard]] bool is_over(const Task& task, int row, int step, double best) const noexcept;
+  [[nodiscard]] double look_of(std::size_t lane) const noexcept;
+  [[nodiscard]] double finish(const Task& task, int row, int step) noexcept;
+  void leave(const Task& task, int row, int step) noexcept;
 
   Config config_;
   int sample_size_ = 0;
-  std::span<RegionSample> samples_;
-  RegionSums sums_;           ///< [candidate], largest disparity first
-  std::span<double> scores_;  ///< E, [row offset][d - range.min]; kNoScore where no candidate exists
+  Rect extent_;                      ///< of the samples
+  std::span<RegionSample> found_;    ///< in raster order
+  std::span<RegionSample> samples_;  ///< the same, the first few from all over the region
+  RegionSums sums_;                  ///< [row offset][lane], the largest disparity first, steps of lanes padded
+  std::span<std::int16_t> summed_;   ///< [row offset][step of lanes]: samples so far
+  std::span<double> scores_;  ///< E, [row offset][d - range.min]; kNoScore where no candidate exists, kLeft where left
   std::span<double> shares_;  ///< share, likewise
 };
 static_assert(RealTimeStage<RegionMatcher, &RegionMatcher::run<std::uint8_t>, &RegionMatcher::run<std::uint16_t>>);

@@ -18,6 +18,44 @@ class Appearance {
 
   void clear() noexcept { *this = Appearance(); }
 
+  /// How often each colour comes, in the sixteen halves of the bins of Y. Neighbours are alike, and a count that has
+  /// just been stored must be waited for: two tables in turns.
+  class Counts {
+   public:
+    /// n pixels of a row; null chroma for grey.
+    void add(const std::uint8_t* y, const std::uint8_t* cb, const std::uint8_t* cr, int n) noexcept {
+      for (int i = 0; i < n; ++i) {
+        const int chroma = cb == nullptr ? kGrey : chroma_bin(cb[i]) * 8 + chroma_bin(cr[i]);
+        ++counts_[static_cast<std::size_t>(i & 1)][static_cast<std::size_t>((y[i] >> 4) * kChromas + chroma)];
+      }
+      pixels_ += n;
+    }
+
+   private:
+    friend class Appearance;
+    std::array<std::array<std::uint32_t, 16 * 64>, 2> counts_{};
+    int pixels_ = 0;
+  };
+
+  Appearance() noexcept = default;
+
+  /// What add() of each of the pixels gives.
+  explicit Appearance(const Counts& counts) noexcept {
+    const auto half = [&](int bin, int chroma) {
+      const auto at = static_cast<std::size_t>(std::clamp(bin, 0, 15) * kChromas + chroma);
+      return counts.counts_[0][at] + counts.counts_[1][at];
+    };
+    for (int near = 0; near < 8; ++near) {
+      for (int chroma = 0; chroma < kChromas; ++chroma) {
+        // Its own halves, and those beside it; what lies beside no other bin counts twice.
+        const std::uint32_t sum = half(2 * near - 1, chroma) + half(2 * near, chroma) + half(2 * near + 1, chroma) +
+                                  half(2 * near + 2, chroma);
+        share_[static_cast<std::size_t>(near * kChromas + chroma)] = static_cast<float>(static_cast<std::int32_t>(sum));
+      }
+    }
+    total_ = 2.0F * static_cast<float>(counts.pixels_);
+  }
+
   void add(std::uint8_t y, std::uint8_t cb, std::uint8_t cr) noexcept {
     const int chroma = chroma_bin(cb) * 8 + chroma_bin(cr);
     const int near = y >> 5;
@@ -66,6 +104,8 @@ class Appearance {
     }
     return bins;
   }();
+  static constexpr int kChromas = 64;
+  static constexpr int kGrey = 4 * 8 + 4;
   static constexpr int chroma_bin(std::uint8_t c) noexcept { return kChromaBins[c]; }
 
   std::array<float, kBins> share_{};

@@ -12,9 +12,7 @@ namespace stereotrack {
 namespace {
 
 constexpr std::uint16_t kFar = 0xFFFF;
-constexpr std::uint16_t kLoose = 0xFFFF;    // belongs to no large component
-constexpr std::uint16_t kUnseen = 0xFFFE;   // not reached by the flood yet
-constexpr std::uint16_t kOutside = 0xFFFD;  // no pixel of the blob
+constexpr std::uint16_t kLoose = 0xFFFF;  // belongs to no large component
 constexpr int kSweeps = 2;
 constexpr int kLumaStep = 4;
 constexpr double kSmallPart = 0.05;
@@ -37,6 +35,9 @@ Result<DepthSegments> DepthSegments::create(const Config& config, int width, int
   self.filled_ = arena.image<std::uint16_t>(width, height);
   self.segment_ = framed();
   self.cost_ = framed();
+  self.jump_ = config.jump_px * kDisparityScale;
+  self.surely_near_ = static_cast<int>(std::min(self.jump_, 65535.0));
+  self.pieces_ = arena.array<Piece>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   self.places_ = arena.array<Place>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
@@ -80,46 +81,100 @@ void DepthSegments::spread(ImageView<const std::uint8_t> luma, std::size_t count
   }
 }
 
-// Components of continuous disparity; those under `least` pixels become kLoose.
-int DepthSegments::flood(const Input& in, const Blob& blob, int least) noexcept {
-  int found = 0;
-  const Rect& box = blob.box;
-  for (int y = box.top - 1; y <= box.bottom(); ++y) std::fill_n(&segment_.at(box.left - 1, y), box.width + 2, kOutside);
-  for_each_pixel(in.labels, box, blob.label, [&](int x, int y) { segment_.at(x, y) = kUnseen; });
-  const double jump_px = config_.jump_px * kDisparityScale;
-  const int surely_near = static_cast<int>(std::min(jump_px, 65535.0));
-  const auto hang_together = [&](int a, int b) {
-    const int apart = std::abs(a - b);
-    return apart <= surely_near || apart <= std::max(jump_px, config_.jump * std::max(a, b));
-  };
-  for_each_pixel(in.labels, box, blob.label, [&](int x0, int y0) {
-    if (segment_.at(x0, y0) != kUnseen) return;
-    std::size_t last = 0;
-    std::size_t known = 0;
-    places_[last++] = {static_cast<std::uint16_t>(x0), static_cast<std::uint16_t>(y0)};
-    segment_.at(x0, y0) = static_cast<std::uint16_t>(found);
-    for (std::size_t first = 0; first < last; ++first) {
-      const Place p = places_[first];
-      const int here = filled_.at(p.x, p.y);
-      known += in.disparity.at(p.x, p.y) != kNoDisparity ? 1U : 0U;
-      const auto visit = [&](int x, int y) {
-        if (segment_.at(x, y) != kUnseen || !hang_together(here, filled_.at(x, y))) return;
-        segment_.at(x, y) = static_cast<std::uint16_t>(found);
-        places_[last++] = {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
-      };
-      visit(p.x + 1, p.y);
-      visit(p.x - 1, p.y);
-      visit(p.x, p.y + 1);
-      visit(p.x, p.y - 1);
+bool DepthSegments::hang_together(int a, int b) const noexcept {
+  const int apart = std::abs(a - b);
+  return apart <= surely_near_ || apart <= std::max(jump_, config_.jump * std::max(a, b));
+}
+
+std::int32_t DepthSegments::root_of(std::int32_t piece) noexcept {
+  while (pieces_[piece].parent != piece) {
+    pieces_[piece].parent = pieces_[pieces_[piece].parent].parent;
+    piece = pieces_[piece].parent;
+  }
+  return piece;
+}
+
+// Pieces of two rows, the one next to the other, are joined where a pixel hangs together with the one below it.
+void DepthSegments::join_rows(const Row& above, const Row& here) noexcept {
+  const std::uint16_t* upper = filled_.row(above.y);
+  const std::uint16_t* lower = filled_.row(here.y);
+  std::int32_t a = above.first;
+  std::int32_t b = here.first;
+  while (a < above.end && b < here.end) {
+    const int begin = std::max(pieces_[a].begin, pieces_[b].begin);
+    const int end = std::min(pieces_[a].end, pieces_[b].end);
+    if (begin < end) {
+      const std::int32_t first = root_of(a);
+      const std::int32_t second = root_of(b);
+      int x = first == second ? end : begin;
+      while (x < end && !hang_together(upper[x], lower[x])) ++x;
+      if (first != second && x < end) pieces_[std::max(first, second)].parent = std::min(first, second);
     }
-    // A small one must be sure of itself.
-    const double needed = static_cast<double>(last) < kSmallPart * blob.area ? kSmallKnown : config_.min_known;
-    const bool sure = static_cast<double>(known) >= needed * static_cast<double>(last);
-    if (last >= static_cast<std::size_t>(least) && sure && found < kMost) {
-      ++found;
+    if (pieces_[a].end < pieces_[b].end) {
+      ++a;
     } else {
-      for (std::size_t i = 0; i < last; ++i) segment_.at(places_[i].x, places_[i].y) = kLoose;
+      ++b;
     }
+  }
+}
+
+void DepthSegments::find_pieces(const Input& in, const Blob& blob) noexcept {
+  piece_count_ = 0;
+  Row above{-9, 0, 0};  // in no picture, and next to none
+  Row here{-9, 0, 0};
+  const auto end_row = [&] {
+    if (above.y + 1 == here.y) join_rows(above, here);
+    above = here;
+  };
+  for_each_run(in.labels, blob.box, blob.label, [&](int y, int begin, int end) {
+    if (y != here.y) {
+      end_row();
+      here = {y, piece_count_, piece_count_};
+    }
+    const std::uint16_t* filled = filled_.row(y);
+    const std::uint16_t* disparity = in.disparity.row(y);
+    for (int x = begin; x < end;) {
+      const int from = x++;
+      while (x < end && hang_together(filled[x - 1], filled[x])) ++x;
+      std::int32_t known = 0;
+      for (int u = from; u < x; ++u) known += disparity[u] != kNoDisparity ? 1 : 0;
+      pieces_[piece_count_] = {static_cast<std::uint16_t>(from), static_cast<std::uint16_t>(x), piece_count_, x - from,
+                               known};
+      ++piece_count_;
+    }
+    here.end = piece_count_;
+  });
+  end_row();
+}
+
+// Components of continuous disparity, in the order of their first pixels; those under `least` pixels become kLoose. How
+// many, and segment_ where they are more than one.
+int DepthSegments::number_pieces(const Input& in, const Blob& blob, int least) noexcept {
+  for (std::int32_t i = 0; i < piece_count_; ++i) {
+    const std::int32_t root = root_of(i);
+    if (root == i) continue;
+    pieces_[root].area += pieces_[i].area;
+    pieces_[root].known += pieces_[i].known;
+  }
+  int found = 0;
+  for (std::int32_t i = 0; i < piece_count_; ++i) {
+    Piece& piece = pieces_[i];
+    if (piece.parent != i) continue;
+    // A small one must be sure of itself.
+    const double needed = piece.area < kSmallPart * blob.area ? kSmallKnown : config_.min_known;
+    const bool sure = piece.known >= needed * piece.area;
+    piece.known = piece.area >= least && sure && found < kMost ? found++ : kLoose;
+  }
+  if (found <= 1) return found;
+  std::int32_t next = 0;
+  for_each_run(in.labels, blob.box, blob.label, [&](int y, int /*begin*/, int end) {
+    for (; next < piece_count_; ++next) {
+      const Piece& piece = pieces_[next];
+      std::fill(&segment_.at(piece.begin, y), &segment_.at(piece.begin, y) + (piece.end - piece.begin),
+                static_cast<std::uint16_t>(pieces_[root_of(next)].known));
+      if (piece.end == end) break;
+    }
+    ++next;
   });
   return found;
 }
@@ -142,7 +197,9 @@ std::size_t DepthSegments::start_spread(const Input& in, const Blob& blob, Known
 
 int DepthSegments::run(const Input& in, const Blob& blob) noexcept {
   const auto all_one = [&] {
-    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) { segment_.at(x, y) = 0; });
+    for_each_run(in.labels, blob.box, blob.label, [&](int y, int begin, int end) {
+      std::fill_n(&segment_.at(begin, y), end - begin, std::uint16_t{0});
+    });
     return 1;
   };
   bool any = false;
@@ -155,7 +212,8 @@ int DepthSegments::run(const Input& in, const Blob& blob) noexcept {
   if (!any) return all_one();
   spread(in.y, unknown, filled_);
   const int least = std::max(config_.min_px, static_cast<int>(config_.min_part * blob.area + 1));
-  const int found = flood(in, blob, least);
+  find_pieces(in, blob);
+  const int found = number_pieces(in, blob, least);
   if (found <= 1) return all_one();
   const std::size_t loose = start_spread(in, blob, [&](int x, int y) { return segment_.at(x, y) != kLoose; });
   spread(in.y, loose, segment_);

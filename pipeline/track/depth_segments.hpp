@@ -59,16 +59,37 @@ class DepthSegments {
     std::uint16_t x, y;
   };
 
+  /// Neighbours in a row that hang together. `parent` links the pieces of a component; the root is its first one.
+  struct Piece {
+    std::uint16_t begin, end;  // columns
+    std::int32_t parent;
+    std::int32_t area;   // of the root: of the component
+    std::int32_t known;  // likewise; at last its segment
+  };
+  /// Pieces [first, end) lie in row y.
+  struct Row {
+    int y;
+    std::int32_t first, end;
+  };
+
   template <class Known>
   [[nodiscard]] std::size_t start_spread(const Input& in, const Blob& blob, Known&& known) noexcept;
   void spread(ImageView<const std::uint8_t> luma, std::size_t count, ImageView<std::uint16_t> value) noexcept;
-  int flood(const Input& in, const Blob& blob, int least) noexcept;
+  [[nodiscard]] bool hang_together(int a, int b) const noexcept;
+  void find_pieces(const Input& in, const Blob& blob) noexcept;
+  void join_rows(const Row& above, const Row& here) noexcept;
+  [[nodiscard]] std::int32_t root_of(std::int32_t piece) noexcept;
+  [[nodiscard]] int number_pieces(const Input& in, const Blob& blob, int least) noexcept;
 
   Config config_;
   ImageView<std::uint16_t> filled_;
   ImageView<std::uint16_t> segment_;  // one pixel of frame around it, so that neighbours need no test
   ImageView<std::uint16_t> cost_;     // likewise
   std::span<Place> places_;
+  std::span<Piece> pieces_;
+  std::int32_t piece_count_ = 0;
+  double jump_ = 0;      // [1/16 px]
+  int surely_near_ = 0;  // no more than that, whole
 };
 static_assert(RealTimeStage<DepthSegments, &DepthSegments::run>);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "pipeline/geometry/triangulate.hpp"
 #include "pipeline/shape/region.hpp"
@@ -38,6 +40,21 @@ double square(double value) noexcept { return value * value; }
 
 double length(double x, double y) noexcept { return std::sqrt(x * x + y * y); }
 
+// The disparities in 1/16 px, of those that are known, that lie within `reach` of `middle` [px]: first and last, or an
+// empty range.
+std::pair<int, int> values_within(double middle, double reach) noexcept {
+  const auto within = [=](int d) { return std::abs(d / static_cast<double>(kDisparityScale) - middle) <= reach; };
+  const auto value = [](double px) {
+    return static_cast<int>(std::clamp(px * kDisparityScale, 0.0, static_cast<double>(kNoDisparity - 1)));
+  };
+  // Near enough by a value; which of two it is, the question itself says.
+  int low = std::max(value(middle - reach) - 1, 0);
+  int high = std::min(value(middle + reach) + 1, kNoDisparity - 1);
+  while (low <= high && !within(low)) ++low;
+  while (high >= low && !within(high)) --high;
+  return {low, high};
+}
+
 bool fits_into(const Rect& whole, const Rect& box) noexcept {
   return box.width <= kMostGrowth * whole.width + 2 && box.height <= kMostGrowth * whole.height + 2;
 }
@@ -62,35 +79,49 @@ Result<Detector> Detector::create(const Config& config, int width, int height, A
   self.min_area_ = std::max(config.min_area_px, static_cast<int>(config.min_area_ppm * 1e-6 * width * height + 0.5));
   self.candidates_ = BoundedVector<Candidate>(arena.array<Candidate>(kMaxCandidates));
   self.detections_ = BoundedVector<Detection>(arena.array<Detection>(kMaxDetections));
-  self.histogram_ = arena.array<std::uint32_t>(kBins);
+  self.histogram_ = arena.array<std::uint32_t>(2 * kBins);
   self.choice_ = arena.image<std::uint16_t>(width, height);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
 }
 
+// The segment as a candidate, measured once.
+Detector::Candidate& Detector::whole_of(const Input& in, const Blob& blob) noexcept {
+  if (whole_.area == 0) {
+    whole_ = Candidate{};
+    whole_.label = blob.label;
+    whole_.box = blob.box;
+    measure(in, whole_);
+  }
+  return whole_;
+}
+
 void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
-  Candidate whole{};
-  whole.label = blob.label;
-  whole.box = blob.box;
   for (std::size_t k = 0; k < in.predictions.size() && layers_.size() < layers_.capacity(); ++k) {
     const Prediction& target = in.predictions[k];
     if (!target.confirmed || !target.independent) continue;
     const Rect expected = intersect(target.box, {0, 0, width_, height_});
     const Rect common = intersect(expected, blob.box);
     if (common.empty()) continue;
-    if (whole.area == 0) measure(in, whole);
-    if (depth_apart(target, whole, 1) > 1) continue;
+    if (depth_apart(target, whole_of(in, blob), 1) > 1) continue;
     int covered = 0;
     int matching = 0;
     int known = 0;
     const double reach = 3 * (target.disparity_sd + config_.match_noise_px) + config_.split_depth * target.disparity;
-    for_each_pixel(in.labels, common, blob.label, [&](int x, int y) {
-      ++covered;
-      if (!target.has_depth || in.disparity.empty()) return;
-      const int d = in.disparity.at(x, y);
-      if (d == kNoDisparity) return;
-      ++known;
-      if (std::abs(d / static_cast<double>(kDisparityScale) - target.disparity) <= reach) ++matching;
+    const bool by_depth = target.has_depth && !in.disparity.empty();
+    const auto [lowest, highest] = by_depth ? values_within(target.disparity, reach) : std::pair(0, -1);
+    for_each_run(in.labels, common, blob.label, [&, low = lowest, high = highest](int y, int begin, int end) {
+      covered += end - begin;
+      if (!by_depth) return;
+      const std::uint16_t* d = in.disparity.row(y);
+      int known_of_run = 0;
+      int matching_of_run = 0;
+      for (int x = begin; x < end; ++x) {
+        known_of_run += d[x] != kNoDisparity ? 1 : 0;
+        matching_of_run += static_cast<int>(d[x] >= low) & static_cast<int>(d[x] <= high);
+      }
+      known += known_of_run;
+      matching += matching_of_run;
     });
     const auto smaller = static_cast<double>(std::min<std::int64_t>(expected.area(), blob.area));
     if (covered < kClaimPart * smaller) continue;
@@ -129,11 +160,16 @@ void Detector::layers_from_claims(const Input& in, const Blob& blob) noexcept {
   }
 }
 
-// A target that would get but a splinter of the region is not there: it is hidden, or gone.
+// A target that would get but a splinter of the region is not there: it is hidden, or gone. Leaves each pixel's layer,
+// where two or more stay, in choice_.
 void Detector::drop_weak_claims(const Input& in, const Blob& blob) noexcept {
   while (layers_.size() >= 2) {
     std::array<int, 8> pixels{};
-    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) { ++pixels[choose(in, x, y)]; });
+    for_each_pixel(in.labels, blob.box, blob.label, [&](int x, int y) {
+      const std::size_t chosen = choose(in, x, y);
+      ++pixels[chosen];
+      choice_.at(x, y) = static_cast<std::uint16_t>(chosen);
+    });
     std::size_t weakest = layers_.size();
     double least = kSplinterPart;
     for (std::size_t k = 0; k < layers_.size(); ++k) {
@@ -177,14 +213,16 @@ std::size_t Detector::choose(const Input& in, int x, int y) const noexcept {
   return best;
 }
 
-void Detector::add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob, bool whole) noexcept {
+// A part of a segment that targets share.
+void Detector::add_candidate(const Input& in, std::uint16_t label, const Rect& box, int claim,
+                             std::uint16_t blob) noexcept {
   Candidate candidate{};
   candidate.label = label;
   candidate.blob = blob;
   candidate.box = box;
   candidate.claim = claim;
-  candidate.whole = whole;
   candidate.root = static_cast<std::uint16_t>(candidates_.size());
+  measure(in, candidate);
   if (!candidates_.push(candidate)) reject(Rejection::kNoRoom);
 }
 
@@ -210,34 +248,40 @@ void Detector::split(const Input& in, const Blob& blob) noexcept {
 // Two targets at one depth: each pixel goes to the one that explains it best.
 void Detector::split_by_claims(const Input& in, const Blob& segment, std::uint16_t blob) noexcept {
   layers_.clear();
+  whole_.area = 0;
   layers_from_claims(in, segment);
   if (layers_.size() >= 2) drop_weak_claims(in, segment);
   if (layers_.size() < 2 || candidates_.full()) {
-    add_candidate(segment.label, segment.box, -1, blob, true);
+    if (candidates_.full()) return reject(Rejection::kNoRoom);
+    (void)candidates_.push(whole_of(in, segment));
+    Candidate& candidate = candidates_[candidates_.size() - 1];
+    candidate.blob = blob;
+    candidate.claim = -1;
+    candidate.whole = true;
+    candidate.root = static_cast<std::uint16_t>(candidates_.size() - 1);
     return;
   }
   const std::uint16_t first = next_label_;
   next_label_ = static_cast<std::uint16_t>(next_label_ + layers_.size());
-  for_each_pixel(in.labels, segment.box, segment.label,
-                 [&](int x, int y) { choice_.at(x, y) = static_cast<std::uint16_t>(first + choose(in, x, y)); });
   // A pixel that stands alone among pixels of other layers follows them: 5x5 majority, written behind the reader.
   for_each_pixel(in.labels, segment.box, segment.label, [&](int x, int y) {
     std::array<int, 8> votes{};
     for (int v = std::max(y - 2, 0); v <= std::min(y + 2, height_ - 1); ++v) {
       for (int u = std::max(x - 2, 0); u <= std::min(x + 2, width_ - 1); ++u) {
-        if (in.labels.at(u, v) == segment.label) ++votes[static_cast<std::size_t>(choice_.at(u, v) - first)];
+        if (in.labels.at(u, v) == segment.label) ++votes[choice_.at(u, v)];
       }
     }
-    const auto own = static_cast<std::size_t>(choice_.at(x, y) - first);
+    const std::size_t own = choice_.at(x, y);
     std::size_t most = own;
     for (std::size_t k = 0; k < layers_.size(); ++k) {
       if (votes[k] > votes[most]) most = k;
     }
-    choice_.at(x, y) = static_cast<std::uint16_t>(first + most);
+    choice_.at(x, y) = static_cast<std::uint16_t>(most);
   });
-  for_each_pixel(in.labels, segment.box, segment.label, [&](int x, int y) { in.labels.at(x, y) = choice_.at(x, y); });
+  for_each_pixel(in.labels, segment.box, segment.label,
+                 [&](int x, int y) { in.labels.at(x, y) = static_cast<std::uint16_t>(first + choice_.at(x, y)); });
   for (std::size_t k = 0; k < layers_.size(); ++k) {
-    add_candidate(static_cast<std::uint16_t>(first + k), segment.box, layers_[k].claim, blob, false);
+    add_candidate(in, static_cast<std::uint16_t>(first + k), segment.box, layers_[k].claim, blob);
   }
 }
 
@@ -246,25 +290,34 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
   candidate.area = blob.area;
   if (blob.area == 0) return;
   candidate.box = blob.box;
-  candidate.appearance.clear();
-  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
-    candidate.appearance.add(in.y.at(x, y), in.cb.empty() ? 128 : in.cb.at(x, y), in.cr.empty() ? 128 : in.cr.at(x, y));
-  });
+  Appearance::Counts colours;
   candidate.valid = 0;
   candidate.has_depth = false;
-  if (in.disparity.empty()) return;
-  std::size_t first = kBins;
-  std::size_t last = 0;
-  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
-    const std::uint16_t d = in.disparity.at(x, y);
-    if (d == kNoDisparity) return;
-    const std::size_t at = d / kBin;
-    ++histogram_[at];
-    first = std::min(first, at);
-    last = std::max(last, at);
-    ++candidate.valid;
+  const bool stereo = !in.disparity.empty();
+  int first_value = kNoDisparity;
+  int last_value = -1;
+  for_each_run(in.labels, candidate.box, candidate.label, [&](int y, int begin, int end) {
+    const bool grey = in.cb.empty();
+    colours.add(in.y.row(y) + begin, grey ? nullptr : in.cb.row(y) + begin, grey ? nullptr : in.cr.row(y) + begin,
+                end - begin);
+    if (!stereo) return;
+    const std::uint16_t* d = in.disparity.row(y);
+    for (int x = begin; x < end; ++x) {
+      ++histogram_[static_cast<std::size_t>(x & 1) * kBins + d[x] / kBin];
+      // The next value of kNoDisparity is 0.
+      first_value = std::min<int>(first_value, d[x]);
+      last_value = std::max<int>(last_value, static_cast<std::uint16_t>(d[x] + 1) - 1);
+    }
   });
+  candidate.appearance = Appearance(colours);
+  if (!stereo) return;
+  constexpr std::size_t kNone = kNoDisparity / kBin;
+  candidate.valid = candidate.area - static_cast<int>(histogram_[kNone] + histogram_[kBins + kNone]);
+  histogram_[kNone] = histogram_[kBins + kNone] = 0;
   if (candidate.valid == 0) return;
+  const auto first = static_cast<std::size_t>(first_value / kBin);
+  const auto last = static_cast<std::size_t>(last_value / kBin);
+  for (std::size_t i = first; i <= last; ++i) histogram_[i] += histogram_[kBins + i];
   const auto half = static_cast<std::uint32_t>((candidate.valid + 1) / 2);
   std::uint32_t below = 0;
   std::size_t bin = first;
@@ -289,8 +342,9 @@ void Detector::measure(const Input& in, Candidate& candidate) noexcept {
     if (bin + reach < kBins) inside += histogram_[bin + reach];
   }
   candidate.reach = (static_cast<double>(reach) + 0.25) * kBin / kDisparityScale;
-  std::fill(histogram_.begin() + static_cast<std::ptrdiff_t>(first),
-            histogram_.begin() + static_cast<std::ptrdiff_t>(last) + 1, 0U);
+  for (const std::size_t table : {std::size_t{0}, kBins}) {
+    std::fill_n(histogram_.begin() + static_cast<std::ptrdiff_t>(table + first), last - first + 1, 0U);
+  }
   // A block's disparities hang together: about one independent value every 5 x 5 pixels.
   const double independent = std::max(candidate.valid / 25.0, 1.0);
   candidate.disparity_sd = std::sqrt(square(kLeastDisparitySd) + square(1.5 * candidate.scatter) / independent);
@@ -409,8 +463,11 @@ void Detector::merge(const Input& in) noexcept {
     candidates_[i].area = 0;
   }
   if (!merged) return;
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    if (candidates_[i].area == 0) candidates_[root_of(i)].grown = true;
+  }
   for (Candidate& candidate : candidates_) {
-    if (candidate.area > 0) measure(in, candidate);
+    if (candidate.area > 0 && candidate.grown) measure(in, candidate);
   }
 }
 
@@ -425,13 +482,14 @@ std::span<Detector::Candidate> Detector::segment(const Input& in) noexcept {
       if (candidate.area > 0 && candidate.claim < 0) candidate.claim = claim_of(in, candidate);
     }
   };
-  for (Candidate& candidate : candidates_) measure(in, candidate);
   claim();
   merge(in);
   claim();
   std::size_t kept = 0;
-  for (const Candidate& candidate : candidates_) {
-    if (candidate.area > 0) candidates_[kept++] = candidate;
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    if (candidates_[i].area == 0) continue;
+    if (kept < i) candidates_[kept] = candidates_[i];
+    ++kept;
   }
   candidates_.truncate(kept);
   return {candidates_.begin(), candidates_.size()};
@@ -445,29 +503,41 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   out.region = candidate.blob;
   out.appearance = candidate.appearance;
   std::uint64_t strength = 0;
+  int places_known = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double u_sum = 0;
   double v_sum = 0;
   const bool stereo = candidate.has_depth && in.rectifier != nullptr;
   const double reach = 3 * candidate.scatter + 1;
-  for_each_pixel(in.labels, candidate.box, candidate.label, [&](int x, int y) {
-    strength += in.strength.at(x, y);
+  int last_raw = kNoDisparity;
+  double scale = stereo ? in.rectifier->geometry().baseline / candidate.disparity : 0;
+  for_each_run(in.labels, candidate.box, candidate.label, [&](int y, int begin, int end) {
+    const std::uint8_t* strengths = in.strength.row(y);
+    std::uint32_t strength_of_run = 0;
+    for (int x = begin; x < end; ++x) strength_of_run += strengths[x];
+    strength += strength_of_run;
     if (!stereo) return;
-    const Rectifier::PointF place = in.rectifier->rectified_from_raw().at(x, y);
-    if (!place.valid()) return;
-    const int raw = in.disparity.empty() ? kNoDisparity : in.disparity.at(x, y);
-    double d = raw == kNoDisparity ? candidate.disparity : raw / static_cast<double>(kDisparityScale);
-    if (std::abs(d - candidate.disparity) > reach || d < kMinDisparity) d = candidate.disparity;
     const RectifiedGeometry& g = in.rectifier->geometry();
-    const double scale = g.baseline / d;
-    mean += Eigen::Vector3d((place.x - g.cx_left) * scale, (place.y - g.cy) * scale, g.f * scale);
-    u_sum += place.x;
-    v_sum += place.y;
-    out.disparity_sd += 1;
+    const Rectifier::PointF* places = in.rectifier->rectified_from_raw().row(y);
+    const std::uint16_t* disparity = in.disparity.empty() ? nullptr : in.disparity.row(y);
+    for (int x = begin; x < end; ++x) {
+      const Rectifier::PointF place = places[x];
+      if (!place.valid()) continue;
+      const int raw = disparity == nullptr ? kNoDisparity : disparity[x];
+      if (raw != last_raw) {  // neighbours' mostly are alike
+        double d = raw == kNoDisparity ? candidate.disparity : raw / static_cast<double>(kDisparityScale);
+        if (std::abs(d - candidate.disparity) > reach || d < kMinDisparity) d = candidate.disparity;
+        scale = g.baseline / d;
+        last_raw = raw;
+      }
+      mean += Eigen::Vector3d((place.x - g.cx_left) * scale, (place.y - g.cy) * scale, g.f * scale);
+      u_sum += place.x;
+      v_sum += place.y;
+      ++places_known;
+    }
   });
   out.strength = std::min(static_cast<double>(strength) / candidate.area / 80.0, 1.0);
-  const double placed = out.disparity_sd;
-  out.disparity_sd = 0;
+  const double placed = places_known;
   if (stereo && placed > 0 && candidate.disparity >= kMinDisparity) {
     const RectifiedGeometry& g = in.rectifier->geometry();
     out.position = mean / placed;
@@ -490,11 +560,18 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
 
 std::span<const Detection> Detector::conclude(const Input& in) noexcept {
   detections_.clear();
-  std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
+  // A candidate is large: their places are sorted.
+  std::array<std::uint16_t, kMaxCandidates> order;
+  const auto count = static_cast<std::ptrdiff_t>(candidates_.size());
+  std::iota(order.begin(), order.begin() + count, std::uint16_t{0});
+  std::sort(order.begin(), order.begin() + count, [this](std::uint16_t i, std::uint16_t j) {
+    const Candidate& a = candidates_[i];
+    const Candidate& b = candidates_[j];
     return a.area != b.area ? a.area > b.area : a.label < b.label;
   });
   const std::uint16_t offset = 0x8000;
-  for (const Candidate& candidate : candidates_) {
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    const Candidate& candidate = candidates_[order[static_cast<std::size_t>(i)]];
     if (candidate.area < min_area_) {
       reject(Rejection::kSmall);
       continue;

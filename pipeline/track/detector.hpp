@@ -24,7 +24,7 @@ enum class Rejection : std::uint8_t {
   kInconsistent,  ///< its disparities scatter too much to be one object
   kShadow,        ///< the shadow test left nothing of it
   kOwnSurface,    ///< its disparity is the background's own: light, a shadow or a mark
-  kNoRoom,        ///< more candidates than the detector holds
+  kNoRoom,        ///< more runs of the mask, blobs or candidates than there is room for
 };
 inline constexpr std::size_t kRejections = 6;
 [[nodiscard]] constexpr const char* to_string(Rejection why) noexcept {
@@ -100,6 +100,7 @@ class Detector {
     Appearance appearance;
     std::uint16_t root;  ///< used while merging: index of the candidate that this one goes to
     Rect united;         ///< and the box of all that go to this one
+    bool grown;          ///< and whether any does
   };
 
   /// Faults: kBadConfig, kBadSize, kOutOfMemory.
@@ -130,8 +131,9 @@ class Detector {
   void split_by_claims(const Input& in, const Blob& segment, std::uint16_t blob) noexcept;
   void layers_from_claims(const Input& in, const Blob& blob) noexcept;
   void drop_weak_claims(const Input& in, const Blob& blob) noexcept;
+  [[nodiscard]] Candidate& whole_of(const Input& in, const Blob& blob) noexcept;
   [[nodiscard]] std::size_t choose(const Input& in, int x, int y) const noexcept;
-  void add_candidate(std::uint16_t label, const Rect& box, int claim, std::uint16_t blob, bool whole) noexcept;
+  void add_candidate(const Input& in, std::uint16_t label, const Rect& box, int claim, std::uint16_t blob) noexcept;
   void measure(const Input& in, Candidate& candidate) noexcept;
   void merge(const Input& in) noexcept;
   [[nodiscard]] double depth_apart(const Prediction& target, const Candidate& candidate,
@@ -153,9 +155,10 @@ class Detector {
   RejectionCounts rejections_{};
   BoundedVector<Candidate> candidates_;
   BoundedVector<Detection> detections_;
-  std::span<std::uint32_t> histogram_;  ///< of one candidate while it is measured, else all 0
+  std::span<std::uint32_t> histogram_;  ///< of one candidate while it is measured, else all 0; two tables
   FixedVector<Layer, 8> layers_;
-  ImageView<std::uint16_t> choice_;
+  Candidate whole_{};                ///< the segment that is being split, where area > 0
+  ImageView<std::uint16_t> choice_;  ///< layer of each of its pixels
 };
 static_assert(RealTimeStage<Detector, &Detector::segment, &Detector::conclude>);
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 
 namespace stereotrack {
 
@@ -79,7 +78,7 @@ Result<Features> Features::create(const Config& config, int width, int height, A
   if (width < 1 || height < 1) return fail(Fault::kBadSize);
   Features self;
   self.config_ = config;
-  self.strength_ = arena.image<float>(width, height);
+  self.corners_ = arena.array<Corner>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
 }
@@ -108,21 +107,10 @@ void Features::follow(ImageView<const std::uint8_t> luma, double dt, double acce
     const int reach_y = reach(S(1, 1));
     const int x0 = static_cast<int>(std::floor(expected.x() + 0.5));
     const int y0 = static_cast<int>(std::floor(expected.y() + 0.5));
-    int best = std::numeric_limits<int>::max();
-    int best_x = 0;
-    int best_y = 0;
     const Rect window = intersect({x0 - reach_x, y0 - reach_y, 2 * reach_x + 1, 2 * reach_y + 1},
                                   grown({0, 0, luma.width, luma.height}, -kReach));
-    std::array<std::int32_t, kMostPlaces> costs;
-    for (int y = window.top; y < window.bottom(); ++y) {
-      patch_costs(feature.patch, luma, window.left, y, window.width, costs.data());
-      for (int i = 0; i < window.width; ++i) {
-        if (costs[static_cast<std::size_t>(i)] >= best) continue;
-        best = costs[static_cast<std::size_t>(i)];
-        best_x = window.left + i;
-        best_y = y;
-      }
-    }
+    if (window.empty()) continue;
+    const auto [best, best_x, best_y] = best_place(feature.patch, luma, window);
     if (best > config_.most_difference * kArea) continue;
     const Vector found = feature.offset + Vector(best_x, best_y) + sub_pixel(feature.patch, luma, best_x, best_y);
     if (!feature.filter.update(found, R)) continue;
@@ -144,39 +132,37 @@ void Features::refill(ImageView<const std::uint8_t> luma, ImageView<const std::u
   const Rect inside = intersect(box, {0, 0, luma.width, luma.height});
   if (inside.empty() || set.size() == Set::capacity()) return;
   static_assert(kReach > kTensorReach, "where a patch fits, a tensor does, too");
-  for (int y = inside.top; y < inside.bottom(); ++y) std::fill_n(&strength_.at(inside.left, y), inside.width, 0.0F);
+  const auto least = static_cast<float>(config_.corner_quality);
+  std::ptrdiff_t count = 0;
   const Rect fitting = intersect(inside, grown({0, 0, luma.width, luma.height}, -kReach));
   std::array<Tensor, kMostTensors> row;
   for (int y = fitting.top; y < fitting.bottom(); ++y) {
     for (int left = fitting.left; left < fitting.right(); left += kMostTensors) {
-      const int count = std::min(fitting.right() - left, kMostTensors);
-      tensors(luma, left, y, count, row.data());
-      for (int i = 0; i < count; ++i) {
+      const int places = std::min(fitting.right() - left, kMostTensors);
+      tensors(luma, left, y, places, row.data());
+      for (int i = 0; i < places; ++i) {
         if (labels.at(left + i, y) != label) continue;
-        strength_.at(left + i, y) = static_cast<float>(smaller_eigenvalue(row[static_cast<std::size_t>(i)]));
+        const auto strength = static_cast<float>(smaller_eigenvalue(row[static_cast<std::size_t>(i)]));
+        if (strength > least)
+          corners_[count++] = {static_cast<std::uint16_t>(left + i), static_cast<std::uint16_t>(y), strength};
       }
     }
   }
   const auto clear_around = [&](double px, double py) {
-    const Rect taken = intersect(
-        inside, {static_cast<int>(px) - kPatch, static_cast<int>(py) - kPatch, 2 * kPatch + 1, 2 * kPatch + 1});
-    for (int y = taken.top; y < taken.bottom(); ++y) std::fill_n(&strength_.at(taken.left, y), taken.width, 0.0F);
+    const Rect taken{static_cast<int>(px) - kPatch, static_cast<int>(py) - kPatch, 2 * kPatch + 1, 2 * kPatch + 1};
+    const auto lies_there = [&](const Corner& corner) {
+      return corner.x >= taken.left && corner.x < taken.right() && corner.y >= taken.top && corner.y < taken.bottom();
+    };
+    count = std::remove_if(corners_.begin(), corners_.begin() + count, lies_there) - corners_.begin();
   };
   for (const Feature& feature : set) clear_around(feature.filter.position().x(), feature.filter.position().y());
   const ConstantVelocityFilter<2>::Matrix R =
       ConstantVelocityFilter<2>::Matrix::Identity() * (kSearchNoise * kSearchNoise);
   while (set.size() < Set::capacity()) {
-    auto best = static_cast<float>(config_.corner_quality);
-    Point where{-1, -1};
-    for (int y = inside.top; y < inside.bottom(); ++y) {
-      for (int x = inside.left; x < inside.right(); ++x) {
-        if (strength_.at(x, y) > best) {
-          best = strength_.at(x, y);
-          where = {x, y};
-        }
-      }
-    }
-    if (where.x < 0) return;
+    if (count == 0) return;
+    // The first of the strongest.
+    const Corner where = *std::max_element(corners_.begin(), corners_.begin() + count,
+                                           [](const Corner& a, const Corner& b) { return a.strength < b.strength; });
     Feature feature;
     feature.filter.start({static_cast<double>(where.x), static_cast<double>(where.y)}, R, velocity_sd, velocity);
     cut(luma, where.x, where.y, feature.patch);

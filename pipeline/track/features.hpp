@@ -65,8 +65,13 @@ class Features {
   [[nodiscard]] static double corner_strength(ImageView<const std::uint8_t> luma, int x, int y) noexcept;
 
  private:
+  struct Corner {
+    std::uint16_t x, y;
+    float strength;
+  };
+
   Config config_;
-  ImageView<float> strength_;
+  std::span<Corner> corners_;  ///< of a box that are strong enough and still free, row by row
 };
 static_assert(RealTimeStage<Features, &Features::follow, &Features::refill>);
 

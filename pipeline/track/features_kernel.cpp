@@ -17,8 +17,8 @@ namespace {
 
 #if HWY_TARGET == HWY_SCALAR
 
-void costs_of(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y, int count, std::int32_t* costs) {
-  patch_costs_reference(patch, luma, x, y, count, costs);
+PatchPlace best_of(const Patch& patch, ImageView<const std::uint8_t> luma, const Rect& window) {
+  return best_place_reference(patch, luma, window);
 }
 void tensors_of(ImageView<const std::uint8_t> luma, int x, int y, int count, Tensor* out) {
   tensors_reference(luma, x, y, count, out);
@@ -32,30 +32,60 @@ constexpr std::size_t kMostLanes = 16;
 using Wide = hn::CappedTag<std::uint16_t, kMostLanes>;
 using Narrow = hn::CappedTag<std::uint16_t, kMostLanes / 2>;
 
-// The picture's rows under the patch, times kPatchArea, and the sums of their columns; what follows the last place's
-// patch is 0.
-constexpr std::size_t kRowLength = kMostPlaces + kPatchSide - 1 + kMostLanes;
+// What the patches of two neighbouring rows of places cover of the picture.
+constexpr int kRows = kPatchSide + 1;
+constexpr std::size_t kRowLength = kMostPlaces + kPatchSide - 1 + 2 * kMostLanes;
 struct Rows {
-  alignas(64) std::uint16_t scaled[kPatchSide][kRowLength];
-  alignas(64) std::uint16_t column_sums[kRowLength];
+  alignas(
+      64) std::uint16_t scaled[kRows][kRowLength] = {};  // pixels times kPatchArea; row r of the window's at r % kRows
+  alignas(64) std::uint16_t sums[2][kRowLength] = {};    // of the columns under the upper patches, and the lower
 };
 
 // A difference of two sums, or of pixels times kPatchArea, is at least -kBias.
 constexpr int kBias = 255 * kPatchArea;
 
-// The costs of as many places as D has lanes, from place i on. Differences of 16 bits: 2 kBias < 2^16.
+struct Shape {
+  alignas(64) std::uint16_t biased[kPatchArea];  // pixels times kPatchArea, and kBias
+  int sum = 0;
+};
+
+// Row r under the patches enters; nothing is read outside the picture.
+void enter(ImageView<const std::uint8_t> luma, int x, int y, int columns, std::uint16_t* scaled) {
+  const Wide wide;
+  const hn::Rebind<std::uint8_t, Wide> bytes;
+  const int lanes = static_cast<int>(hn::Lanes(wide));
+  const std::uint8_t* from = luma.row(y) + x;
+  int u = 0;
+  for (; u < columns && x + u + lanes <= luma.width; u += lanes) {
+    hn::StoreU(hn::Mul(hn::PromoteTo(wide, hn::LoadU(bytes, from + u)), hn::Set(wide, kPatchArea)), wide, scaled + u);
+  }
+  for (; u < columns; ++u) scaled[u] = static_cast<std::uint16_t>(from[u] * kPatchArea);
+}
+
+// The sums of nine rows' columns, pixels as they are: from those one row further up.
+void move_down(const std::uint16_t* above, const std::uint8_t* leaves, const std::uint8_t* enters, int columns,
+               std::uint16_t* sums) {
+  for (int u = 0; u < columns; ++u) sums[u] = static_cast<std::uint16_t>(above[u] + enters[u] - leaves[u]);
+}
+
 template <class D>
-void costs_from(D d, const Rows& rows, const std::uint16_t* biased, int patch_sum, int i, std::int32_t* costs) {
+hn::Vec<D> nine(D d, const std::uint16_t* sums) {
+  auto sum = hn::LoadU(d, sums);
+  for (int u = 1; u < kPatchSide; ++u) sum = hn::Add(sum, hn::LoadU(d, sums + u));
+  return sum;
+}
+
+// The costs of as many places as D has lanes: sums of the picture's pixels under each, and the picture's row v under
+// the patches from column u on. Differences of 16 bits: 2 kBias < 2^16.
+template <class D, class Row>
+void costs_from(D d, const Shape& shape, hn::Vec<D> sum, Row&& row, std::int32_t* costs) {
   const hn::RepartitionToWide<D> sums;
-  auto sum = hn::LoadU(d, rows.column_sums + i);
-  for (int u = 1; u < kPatchSide; ++u) sum = hn::Add(sum, hn::LoadU(d, rows.column_sums + i + u));
-  const auto shift = hn::Sub(hn::Set(d, static_cast<std::uint16_t>(patch_sum + kBias)), sum);
+  const auto shift = hn::Sub(hn::Set(d, static_cast<std::uint16_t>(shape.sum + kBias)), sum);
   auto even = hn::Zero(sums);
   auto odd = hn::Zero(sums);
   for (int v = 0; v < kPatchSide; ++v) {
-    const std::uint16_t* row = rows.scaled[v] + i;
     for (int u = 0; u < kPatchSide; ++u) {
-      const auto difference = hn::Sub(hn::Set(d, biased[v * kPatchSide + u]), hn::LoadU(d, row + u));
+      const auto difference = hn::Sub(hn::Set(d, shape.biased[v * kPatchSide + u]), row(v, u));
       const auto apart = hn::Or(hn::SaturatedSub(difference, shift), hn::SaturatedSub(shift, difference));
       const auto pairs = hn::BitCast(sums, apart);
       even = hn::Add(even, hn::And(pairs, hn::Set(sums, 0xFFFFU)));
@@ -72,38 +102,80 @@ void costs_from(D d, const Rows& rows, const std::uint16_t* biased, int patch_su
   }
 }
 
-void costs_of(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y, int count, std::int32_t* costs) {
-  Rows rows;
-  const int columns = count + kPatchSide - 1;
-  std::fill_n(rows.column_sums, kRowLength, std::uint16_t{0});
-  for (int v = 0; v < kPatchSide; ++v) {
-    const std::uint8_t* from = luma.row(y + v - kPatchReach) + x - kPatchReach;
-    std::uint16_t* scaled = rows.scaled[v];
-    for (int u = 0; u < columns; ++u) {
-      scaled[u] = static_cast<std::uint16_t>(from[u] * kPatchArea);
-      rows.column_sums[u] = static_cast<std::uint16_t>(rows.column_sums[u] + from[u]);
-    }
-    std::fill_n(scaled + columns, kMostLanes, std::uint16_t{0});
+constexpr int kHalf = kMostLanes / 2;
+
+// The costs of kHalf places under the sums `upper`, and of as many in the row below, where a vector holds both.
+template <class D>
+void two_rows_from(D d, const Shape& shape, const std::uint16_t* upper, const std::uint16_t* lower,
+                   const std::uint16_t* const* under, std::int32_t* costs) {
+  if constexpr (hn::MaxLanes(D()) == kMostLanes) {
+    const hn::Half<D> half;
+    costs_from(
+        d, shape, hn::Combine(d, nine(half, lower), nine(half, upper)),
+        [&](int v, int u)
+            HWY_ATTR { return hn::Combine(d, hn::LoadU(half, under[v + 1] + u), hn::LoadU(half, under[v] + u)); },
+        costs);
   }
-  std::uint16_t biased[kPatchArea];
-  int patch_sum = 0;
+}
+
+PatchPlace best_of(const Patch& patch, ImageView<const std::uint8_t> luma, const Rect& window) {
+  Rows rows;
+  Shape shape;
   for (int i = 0; i < kPatchArea; ++i) {
-    biased[i] = static_cast<std::uint16_t>(patch[static_cast<std::size_t>(i)] * kPatchArea + kBias);
-    patch_sum += patch[static_cast<std::size_t>(i)];
+    shape.biased[i] = static_cast<std::uint16_t>(patch[static_cast<std::size_t>(i)] * kPatchArea + kBias);
+    shape.sum += patch[static_cast<std::size_t>(i)];
+  }
+  const int columns = window.width + kPatchSide - 1;
+  const int left = window.left - kPatchReach;
+  const int top = window.top - kPatchReach;
+  for (int r = 0; r < kPatchSide; ++r) {
+    enter(luma, left, top + r, columns, rows.scaled[r]);
+    const std::uint8_t* from = luma.row(top + r) + left;
+    for (int u = 0; u < columns; ++u) rows.sums[0][u] = static_cast<std::uint16_t>(rows.sums[0][u] + from[u]);
   }
   const Wide wide;
   const Narrow narrow;
-  std::int32_t found[kMostPlaces + kMostLanes];
-  for (int i = 0; i < count;) {
-    if (count - i > static_cast<int>(hn::Lanes(narrow))) {
-      costs_from(wide, rows, biased, patch_sum, i, found + i);
-      i += static_cast<int>(hn::Lanes(wide));
-    } else {
-      costs_from(narrow, rows, biased, patch_sum, i, found + i);
-      i += static_cast<int>(hn::Lanes(narrow));
+  std::int32_t costs[2 * (kMostPlaces + kMostLanes)];
+  PatchPlace best{INT32_MAX, 0, 0};
+  const auto keep = [&](const std::int32_t* found, int y) {
+    for (int i = 0; i < window.width; ++i) {
+      if (found[i] < best.cost) best = {found[i], window.left + i, y};
     }
+  };
+  for (int k = 0; k < window.height;) {
+    const auto row_of = [&](int r) { return rows.scaled[(k + r) % kRows]; };
+    const std::uint16_t* under[kRows];
+    for (int r = 0; r < kRows; ++r) under[r] = row_of(r);
+    // Row k + kPatchSide enters, and row k leaves the sums.
+    const auto go_down = [&](const std::uint16_t* above, std::uint16_t* sums) {
+      enter(luma, left, top + k + kPatchSide, columns, row_of(kPatchSide));
+      move_down(above, luma.row(top + k) + left, luma.row(top + k + kPatchSide) + left, columns, sums);
+    };
+    const bool more = k + 1 < window.height;
+    if (hn::MaxLanes(wide) == kMostLanes && window.width <= kHalf && more) {
+      go_down(rows.sums[0], rows.sums[1]);
+      two_rows_from(wide, shape, rows.sums[0], rows.sums[1], under, costs);
+      keep(costs, window.top + k);
+      keep(costs + kHalf, window.top + k + 1);
+      ++k;
+      if (k + 1 < window.height) go_down(rows.sums[1], rows.sums[0]);
+      ++k;
+      continue;
+    }
+    for (int i = 0; i < window.width;) {
+      const auto at = [&](auto d) HWY_ATTR {
+        costs_from(
+            d, shape, nine(d, rows.sums[0] + i), [&](int v, int u) HWY_ATTR { return hn::LoadU(d, under[v] + i + u); },
+            costs + i);
+        return static_cast<int>(hn::Lanes(d));
+      };
+      i += window.width - i > kHalf ? at(wide) : at(narrow);
+    }
+    keep(costs, window.top + k);
+    if (more) go_down(rows.sums[0], rows.sums[0]);
+    ++k;
   }
-  std::copy_n(found, count, costs);
+  return best;
 }
 
 // Sums of columns, then of five of them.
@@ -165,28 +237,30 @@ namespace stereotrack {
 
 namespace {
 
-HWY_EXPORT(costs_of);
+HWY_EXPORT(best_of);
 HWY_EXPORT(tensors_of);
 
 }  // namespace
 
-void patch_costs_reference(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y, int count,
-                           std::int32_t* costs) noexcept {
-  for (int i = 0; i < count; ++i) {
-    const auto apart = [&](int u, int v) {
-      return patch[static_cast<std::size_t>(v * kPatchSide + u)] -
-             luma.at(x + i + u - kPatchReach, y + v - kPatchReach);
-    };
-    int shift = 0;
-    for (int v = 0; v < kPatchSide; ++v) {
-      for (int u = 0; u < kPatchSide; ++u) shift += apart(u, v);
+PatchPlace best_place_reference(const Patch& patch, ImageView<const std::uint8_t> luma, const Rect& window) noexcept {
+  PatchPlace best{INT32_MAX, 0, 0};
+  for (int y = window.top; y < window.bottom(); ++y) {
+    for (int x = window.left; x < window.right(); ++x) {
+      const auto apart = [&](int u, int v) {
+        return patch[static_cast<std::size_t>(v * kPatchSide + u)] - luma.at(x + u - kPatchReach, y + v - kPatchReach);
+      };
+      int shift = 0;
+      for (int v = 0; v < kPatchSide; ++v) {
+        for (int u = 0; u < kPatchSide; ++u) shift += apart(u, v);
+      }
+      int cost = 0;
+      for (int v = 0; v < kPatchSide; ++v) {
+        for (int u = 0; u < kPatchSide; ++u) cost += std::abs(apart(u, v) * kPatchArea - shift);
+      }
+      if (cost / kPatchArea < best.cost) best = {cost / kPatchArea, x, y};
     }
-    int cost = 0;
-    for (int v = 0; v < kPatchSide; ++v) {
-      for (int u = 0; u < kPatchSide; ++u) cost += std::abs(apart(u, v) * kPatchArea - shift);
-    }
-    costs[i] = cost / kPatchArea;
   }
+  return best;
 }
 
 void tensors_reference(ImageView<const std::uint8_t> luma, int x, int y, int count, Tensor* out) noexcept {
@@ -204,10 +278,9 @@ void tensors_reference(ImageView<const std::uint8_t> luma, int x, int y, int cou
   }
 }
 
-void patch_costs(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y, int count,
-                 std::int32_t* costs) noexcept {
-  if (simd_in_use() == SimdTarget::kScalar) return patch_costs_reference(patch, luma, x, y, count, costs);
-  HWY_DYNAMIC_DISPATCH(costs_of)(patch, luma, x, y, count, costs);
+PatchPlace best_place(const Patch& patch, ImageView<const std::uint8_t> luma, const Rect& window) noexcept {
+  if (simd_in_use() == SimdTarget::kScalar) return best_place_reference(patch, luma, window);
+  return HWY_DYNAMIC_DISPATCH(best_of)(patch, luma, window);
 }
 
 void tensors(ImageView<const std::uint8_t> luma, int x, int y, int count, Tensor* out) noexcept {

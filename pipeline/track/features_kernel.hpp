@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "pipeline/core/image_view.hpp"
+#include "pipeline/core/rect.hpp"
 
 namespace stereotrack {
 
@@ -15,16 +16,21 @@ inline constexpr int kPatchReach = kPatchSide / 2;
 inline constexpr int kPatchArea = kPatchSide * kPatchSide;
 using Patch = std::array<std::uint8_t, kPatchArea>;
 
-/// How badly a patch fits at each of the places (x, y) ... (x + count - 1, y), its middle there:
+/// Where a patch fits best of all the places of `window`, its middle there; of equal ones the first, row by row:
 ///     cost = sum |kPatchArea (p - q) - sum (p - q)| / kPatchArea    over pairs of the patch's and the picture's
 ///     pixels,
 /// kPatchArea times the sum of absolute differences, each patch less its mean. All of the patches must lie in the
-/// picture; count: 1..kMostPlaces. About 5 ns a place.
+/// picture; the window's width and height: 1..kMostPlaces. About 2 ns a place.
 inline constexpr int kMostPlaces = 129;
-void patch_costs(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y, int count,
-                 std::int32_t* costs) noexcept;
-void patch_costs_reference(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y, int count,
-                           std::int32_t* costs) noexcept;
+struct PatchPlace {
+  std::int32_t cost = 0;
+  int x = 0;
+  int y = 0;
+};
+[[nodiscard]] PatchPlace best_place(const Patch& patch, ImageView<const std::uint8_t> luma,
+                                    const Rect& window) noexcept;
+[[nodiscard]] PatchPlace best_place_reference(const Patch& patch, ImageView<const std::uint8_t> luma,
+                                              const Rect& window) noexcept;
 
 /// Structure tensor [a b; b c] = sum [gx^2 gx gy; gx gy gy^2] of a pixel over the 5x5 around it; the gradients gx, gy
 /// are differences of the neighbours to both sides.

@@ -108,5 +108,19 @@ TEST(SummaryOfEleven, NoHeapCallAfterWarmUp) {
   EXPECT_EQ(summary_of(folder / "out")["allocations_after_warmup"], kNoAllocation);
 }
 
+// Eleven objects come one after the other: with room for one blob, the others are counted.
+TEST(SummaryOfRejections, WhatFoundNoRoomIsCounted) {
+  const TempDir folder;
+  const auto without_room = [&](const char* most) {
+    const ProgramResult result = stereotrack_command(
+        {"replay", "synthetic:eleven", "--out", (folder / most).string(), "--set", "synthetic.frames=150", "--set",
+         "synthetic.width=160", "--set", "synthetic.height=120", "--set", std::string("shape.max_blobs=") + most});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return summary_of(folder / most)["candidates_rejected"]["no_room"].get<int>();
+  };
+  EXPECT_EQ(without_room("128"), 0);
+  EXPECT_GT(without_room("1"), 10);
+}
+
 }  // namespace
 }  // namespace stereotrack::test

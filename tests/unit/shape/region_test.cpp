@@ -32,6 +32,41 @@ TEST(Region, EndOfThePictureIsNoBoundaryButAnotherLabelIs) {
   EXPECT_EQ(boundary_of(labels, {0, 0, 4, 3}, 1), expected);
 }
 
+// Four labels are read at a time: against one at a time, at every width and place of a row.
+TEST(Region, RunsAreThoseOfPixelByPixel) {
+  cv::RNG random(5);
+  for (int width = 1; width <= 19; ++width) {
+    for (int round = 0; round < 40; ++round) {
+      cv::Mat_<std::uint16_t> labels(3, width);
+      // Neighbours of the label sought in value, too: a borrow must not pass for it.
+      for (std::uint16_t& label : labels) label = static_cast<std::uint16_t>(random.uniform(0, 2 + round % 3));
+      const Rect box{random.uniform(-2, width), random.uniform(-1, 2), random.uniform(0, width + 3), 2};
+      for (const auto label : std::initializer_list<std::uint16_t>{0, 1, 2, 0xFFFF}) {
+        std::vector<Point> expected;
+        for (int y = std::max(box.top, 0); y < std::min(box.bottom(), 3); ++y) {
+          for (int x = std::max(box.left, 0); x < std::min(box.right(), width); ++x) {
+            if (labels(y, x) == label) expected.push_back({x, y});
+          }
+        }
+        std::vector<Point> pixels;
+        for_each_pixel(const_view(labels), box, label, [&](int x, int y) { pixels.push_back({x, y}); });
+        EXPECT_EQ(pixels, expected) << width;
+        std::vector<Point> of_runs;
+        int last_y = -1;
+        int last_end = -1;
+        for_each_run(const_view(labels), box, label, [&](int y, int begin, int end) {
+          EXPECT_LT(begin, end);
+          EXPECT_TRUE(y != last_y || begin > last_end) << "two runs that touch are one";
+          last_y = y;
+          last_end = end;
+          for (int x = begin; x < end; ++x) of_runs.push_back({x, y});
+        });
+        EXPECT_EQ(of_runs, expected) << width;
+      }
+    }
+  }
+}
+
 TEST(Region, BoxIsClippedAndLimits) {
   cv::Mat_<std::uint16_t> labels(3, 4, std::uint16_t{1});
   int count = 0;

@@ -11,7 +11,9 @@ namespace stereotrack {
 namespace {
 
 struct Sums {
-  explicit Sums(int lanes) : values(4, std::vector<std::int32_t>(static_cast<std::size_t>(lanes) + 1, -9)) {}
+  explicit Sums(int lanes) : values(4, std::vector<std::int32_t>(static_cast<std::size_t>(lanes) + 1, 0)) {
+    for (std::vector<std::int32_t>& of_kind : values) of_kind.back() = -9;
+  }
   [[nodiscard]] RegionSums view() {
     const auto but_last = [](std::vector<std::int32_t>& v) { return std::span(v).first(v.size() - 1); };
     return {but_last(values[0]), but_last(values[1]), but_last(values[2]), but_last(values[3])};
@@ -71,6 +73,35 @@ TEST(RegionKernel, OnePixelByHand) {
     EXPECT_EQ(sums.values[2], (std::vector<std::int32_t>{0, 0, 1, 1, -9}));
     EXPECT_EQ(sums.values[3], (std::vector<std::int32_t>{0, 1, 1, 1, -9}));
   });
+}
+
+TEST(RegionKernel, PartsAddUpToTheWhole) {
+  constexpr int kWidth = 120;
+  constexpr int kHeight = 9;
+  std::mt19937 engine(3);
+  std::vector<std::uint8_t> right(kWidth * kHeight);
+  for (std::uint8_t& pixel : right) pixel = static_cast<std::uint8_t>(engine());
+  const ImageView<const std::uint8_t> view{right.data(), kWidth, kHeight, kWidth};
+  std::vector<RegionSample> samples(300);
+  for (RegionSample& sample : samples) {
+    sample = {static_cast<std::int16_t>(10 + engine() % 20), static_cast<std::int16_t>(engine() % kHeight),
+              static_cast<std::int16_t>(engine() % 256)};
+  }
+  RegionTask task{.samples = samples, .right = view, .moving = view, .shift = -10, .row_offset = 0, .lanes = 40};
+  Sums expected(task.lanes);
+  region_sums_reference(task, expected.view());
+  for (const bool inside : {false, true}) {  // lanes up to the second step's end lie in the picture
+    test::on_each_target([&] {
+      Sums got(task.lanes);
+      for (const auto& [first, count] : {std::pair<std::size_t, std::size_t>{0, 1}, {1, 16}, {17, 0}, {17, 283}}) {
+        RegionTask part = task;
+        part.samples = task.samples.subspan(first, count);
+        part.inside = inside;
+        region_sums(part, got.view());
+      }
+      EXPECT_EQ(got.values, expected.values) << inside;
+    });
+  }
 }
 
 TEST(RegionKernel, NoSampleIsNoSum) {

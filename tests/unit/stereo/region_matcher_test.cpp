@@ -147,6 +147,57 @@ TEST(RegionMatcher, LargeRegionIsSampledWithinTheCapacity) {
   EXPECT_GE(match.pixels, 40);
 }
 
+// Searches that leave what does not count, against one that sums everything up.
+TEST(RegionMatcher, WhatDoesNotCountLeavesNoTrace) {
+  int unique = 0;
+  int vague = 0;
+  for (int seed = 1; seed <= 40; ++seed) {
+    cv::Mat labels;
+    cv::Mat place;
+    const int radius = 3 + seed % 9;
+    const int d = 5 + 3 * seed % 50;
+    cv::Mat left = with_disc(noise(140, 50, seed), 100, 25, radius, labels);
+    cv::Mat right = with_disc(noise(140, 50, 100 + seed), 100 - d, 25 + seed % 3 - 1, radius, place);
+    if (seed % 4 == 0) {  // flat: many places fit
+      left.setTo(90 + seed % 5, labels);
+      right.setTo(90, place);
+    }
+    if (seed % 5 == 0) cv::GaussianBlur(right, right, {7, 7}, 2);
+    if (seed % 7 == 0) cv::dilate(labels, labels, cv::Mat());  // a rim of what lies behind
+    const cv::Mat moving = seed % 2 == 0 ? cv::Mat(place * 255) : cv::Mat();
+    Arena arena;
+    auto matcher = RegionMatcher::create(config_for(left, 80), arena);
+    ASSERT_TRUE(matcher.has_value());
+    matcher->take({0, 0, left.cols, left.rows}, [&](int x, int y) { return labels.at<std::uint8_t>(y, x) == 1; });
+    const auto run = [&](const RegionMatcher::Search& search) {
+      return *matcher->run(view<std::uint8_t>(left), view<std::uint8_t>(right), search, view<std::uint8_t>(moving));
+    };
+    for (const DisparityRange range : {DisparityRange{0, 63}, {0, 79}, {d - 1, d + 1}, {d - 5, d + 14}}) {
+      const RegionMatch whole = run({.range = range});
+      ASSERT_TRUE(whole.found);
+      EXPECT_NEAR(whole.look, whole.cost - 3600 * (1 - whole.foreground_share), 1e-9);
+      for (const double enough : {1.0, 1.5, 3.0}) {
+        for (const double most : {RegionMatcher::kAnyCost, whole.cost, whole.cost * 1.4}) {
+          const RegionMatch found = run({.range = range, .most_cost = most, .enough_uniqueness = enough});
+          ASSERT_TRUE(found.found) << seed;
+          EXPECT_EQ(found.disparity_px, whole.disparity_px) << seed;
+          EXPECT_EQ(found.sigma_px, whole.sigma_px);
+          EXPECT_EQ(found.cost, whole.cost);
+          EXPECT_EQ(found.look, whole.look);
+          EXPECT_EQ(found.uniqueness, std::min(whole.uniqueness, enough)) << seed << ' ' << enough;
+          EXPECT_EQ(found.foreground_share, whole.foreground_share);
+          EXPECT_EQ(found.row_offset, whole.row_offset);
+          EXPECT_EQ(found.pixels, whole.pixels);
+        }
+        EXPECT_FALSE(run({.range = range, .most_cost = whole.cost - 0.01, .enough_uniqueness = enough}).found);
+      }
+      (whole.uniqueness >= 1.5 ? unique : vague) += 1;
+    }
+  }
+  EXPECT_GT(unique, 20);
+  EXPECT_GT(vague, 20);
+}
+
 TEST(RegionMatcher, OnlyTheLabelledPixelsCount) {
   cv::Mat labels;
   cv::Mat unused;

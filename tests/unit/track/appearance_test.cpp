@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+#include <vector>
+
 namespace stereotrack {
 namespace {
 
@@ -45,6 +48,36 @@ TEST(Appearance, PixelCountsHalfInItsBinAndHalfInTheNextNearerOne) {
   EXPECT_DOUBLE_EQ(one.share(63, 128, 128), 0.5);
   EXPECT_EQ(one.share(96, 128, 128), 0);
   EXPECT_EQ(one.share(31, 128, 128), 0);
+}
+
+TEST(Appearance, CountsOfRowsAreThePixelsOneByOne) {
+  std::mt19937 engine(4);
+  for (const bool grey : {false, true}) {
+    Appearance one_by_one;
+    Appearance::Counts counts;
+    for (int n = 0; n < 300; ++n) {  // every level, and rows of every length up to 299
+      std::vector<std::uint8_t> y(static_cast<std::size_t>(n));
+      std::vector<std::uint8_t> cb(y.size(), 128);
+      std::vector<std::uint8_t> cr(y.size(), 128);
+      for (std::size_t i = 0; i < y.size(); ++i) {
+        y[i] = static_cast<std::uint8_t>(engine());
+        if (!grey) cb[i] = static_cast<std::uint8_t>(engine());
+        if (!grey) cr[i] = static_cast<std::uint8_t>(engine());
+        one_by_one.add(y[i], cb[i], cr[i]);
+      }
+      counts.add(y.data(), grey ? nullptr : cb.data(), grey ? nullptr : cr.data(), n);
+    }
+    const Appearance together(counts);
+    for (int y = 0; y < 256; ++y) {
+      for (int chroma = 0; chroma < 256; chroma += 5) {
+        const Colour colour{static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(chroma),
+                            static_cast<std::uint8_t>(255 - chroma / 2)};
+        ASSERT_EQ(share(together, colour), share(one_by_one, colour)) << y << ' ' << chroma;
+      }
+    }
+    EXPECT_EQ(together.explains(one_by_one), 1);
+  }
+  EXPECT_FALSE(Appearance(Appearance::Counts()).known());
 }
 
 TEST(Appearance, GreyStaysGreyUnderASlightTint) {

@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "pipeline/shape/region.hpp"
 #include "pipeline/stereo/disparity.hpp"
@@ -247,6 +248,65 @@ TEST(DepthSegments, Faults) {
   EXPECT_EQ(fault_of(nothing, 16, 8193), Fault::kBadSize);
   arena.seal();
   EXPECT_EQ(fault_of(nothing), Fault::kOutOfMemory);
+}
+
+// Against a flood from pixel to pixel, on blobs of steps, holes, rims and noise.
+TEST(DepthSegments, ComponentsAreThoseOfAFlood) {
+  cv::RNG random(8);
+  int with_many = 0;
+  for (int round = 0; round < 60; ++round) {
+    Scene scene;
+    for (int i = 0; i < 6; ++i) {
+      const cv::Rect where(random.uniform(0, 60), random.uniform(0, 36), random.uniform(4, 34), random.uniform(4, 26));
+      scene.paint(where, random.uniform(4, 40));
+      if (i % 3 == 2) scene.labels(where & cv::Rect(where.x + 3, where.y + 3, 3, 40)).setTo(0);
+    }
+    for (std::uint16_t& d : scene.disparity) {
+      if (d == kNoDisparity) continue;
+      const int noise = random.uniform(0, 20);
+      d = noise == 0 ? kNoDisparity : static_cast<std::uint16_t>(d + (round % 2 == 0 ? noise : 0));
+    }
+    DepthSegments::Config c = config();
+    c.min_px = 12;
+    c.min_part = 0;
+    c.min_known = 0;
+    const int found = scene.run(c);
+    // A component of at least min_px pixels and sure of itself has a number, in the order of their first pixels.
+    cv::Mat_<int> seen(scene.labels.size(), 0);
+    int number = 0;
+    const int area = cv::countNonZero(scene.labels);
+    for (int y0 = 0; y0 < kHeight; ++y0) {
+      for (int x0 = 0; x0 < kWidth; ++x0) {
+        if (scene.labels(y0, x0) != 1 || seen(y0, x0) != 0) continue;
+        std::vector<cv::Point> all{{x0, y0}};
+        seen(y0, x0) = 1;
+        int known = 0;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+          const cv::Point p = all[i];
+          known += scene.disparity(p) != kNoDisparity ? 1 : 0;
+          for (const cv::Point& q :
+               {p + cv::Point(1, 0), p - cv::Point(1, 0), p + cv::Point(0, 1), p - cv::Point(0, 1)}) {
+            if (q.x < 0 || q.y < 0 || q.x >= kWidth || q.y >= kHeight) continue;
+            if (scene.labels(q) != 1 || seen(q) != 0) continue;
+            const double a = scene.filled(p);
+            const double b = scene.filled(q);
+            if (std::abs(a - b) > std::max(16.0, 0.05 * std::max(a, b))) continue;
+            seen(q) = 1;
+            all.push_back(q);
+          }
+        }
+        const bool small = static_cast<double>(all.size()) < 0.05 * area;
+        if (all.size() < 12 || (small && known < 0.6 * static_cast<double>(all.size()))) continue;
+        if (found > 1) {
+          for (const cv::Point& p : all) ASSERT_EQ(scene.segment(p), number) << round << ' ' << p.x << ' ' << p.y;
+        }
+        ++number;
+      }
+    }
+    EXPECT_EQ(found, std::max(number, 1)) << round;
+    with_many += found > 2 ? 1 : 0;
+  }
+  EXPECT_GT(with_many, 20);
 }
 
 }  // namespace

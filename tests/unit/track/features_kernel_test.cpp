@@ -26,25 +26,36 @@ struct Noise {
   ImageView<const std::uint8_t> view;
 };
 
-TEST(FeaturesKernel, PatchCostsAreTheReferenceForEveryCount) {
-  for (const int levels : {2, 256}) {  // black and white: the largest differences
-    const Noise noise(kMostPlaces + kPatchSide - 1, kPatchSide + 1, 5, levels);
+std::vector<int> values_of(const PatchPlace& place) { return {place.cost, place.x, place.y}; }
+
+TEST(FeaturesKernel, TheBestPlaceIsTheReferencesForEveryWindow) {
+  for (const int levels : {2, 256}) {  // black and white: the largest differences, and ties
+    const Noise noise(kMostPlaces + kPatchSide - 1, 30 + kPatchSide - 1, 5, levels);
     const Noise cut(kPatchSide, kPatchSide, 6, levels);
     Patch patch;
     std::copy(cut.pixels.begin(), cut.pixels.end(), patch.begin());
-    for (int count = 1; count <= kMostPlaces; ++count) {
-      const int x = kPatchReach + (kMostPlaces - count) / 2;
-      for (const int y : {kPatchReach, kPatchReach + 1}) {
-        std::vector<std::int32_t> expected(static_cast<std::size_t>(count) + 1, -7);
-        patch_costs_reference(patch, noise.view, x, y, count, expected.data());
-        test::on_each_target([&] {
-          std::vector<std::int32_t> got(expected.size(), -7);
-          patch_costs(patch, noise.view, x, y, count, got.data());
-          EXPECT_EQ(got, expected) << count;
-        });
+    for (int width = 1; width <= kMostPlaces; ++width) {
+      for (const int height : {1, 2, 3, 4, 5, 6, 7, 11, 30}) {
+        if (width > 20 && height > 3) continue;
+        for (const int left : {0, (kMostPlaces - width) / 2, kMostPlaces - width}) {
+          const Rect window{kPatchReach + left, kPatchReach + 30 - height, width, height};
+          const std::vector<int> expected = values_of(best_place_reference(patch, noise.view, window));
+          test::on_each_target(
+              [&] { EXPECT_EQ(values_of(best_place(patch, noise.view, window)), expected) << width << ' ' << height; });
+        }
       }
     }
   }
+}
+
+TEST(FeaturesKernel, TheLargestWindowIsTheReferences) {
+  const Noise noise(kMostPlaces + kPatchSide - 1, kMostPlaces + kPatchSide - 1, 5);
+  const Noise cut(kPatchSide, kPatchSide, 6);
+  Patch patch;
+  std::copy(cut.pixels.begin(), cut.pixels.end(), patch.begin());
+  const Rect window{kPatchReach, kPatchReach, kMostPlaces, kMostPlaces};
+  const std::vector<int> expected = values_of(best_place_reference(patch, noise.view, window));
+  test::on_each_target([&] { EXPECT_EQ(values_of(best_place(patch, noise.view, window)), expected); });
 }
 
 // Half black, half white against its negative: by hand.
@@ -56,15 +67,13 @@ TEST(FeaturesKernel, AMeanDifferenceCostsNothing) {
     patch[i] = static_cast<std::uint8_t>(noise.pixels[i] + 100);
   }
   test::on_each_target([&] {
-    std::int32_t cost = -1;
-    patch_costs(patch, noise.view, kPatchReach, kPatchReach, 1, &cost);
+    const std::int32_t cost = best_place(patch, noise.view, {kPatchReach, kPatchReach, 1, 1}).cost;
     EXPECT_EQ(cost, 0);
   });
   // One pixel more by 81: the others are 1 under the mean difference, it 80 over; 160 grey levels in all.
   patch[40] = static_cast<std::uint8_t>(patch[40] + (patch[40] < 150 ? 81 : -81));
   test::on_each_target([&] {
-    std::int32_t cost = -1;
-    patch_costs(patch, noise.view, kPatchReach, kPatchReach, 1, &cost);
+    const std::int32_t cost = best_place(patch, noise.view, {kPatchReach, kPatchReach, 1, 1}).cost;
     EXPECT_EQ(cost, 160);
   });
 }
