@@ -11,6 +11,7 @@
 #include "pipeline/core/rect.hpp"
 #include "pipeline/frame.hpp"
 #include "pipeline/geometry/calibration.hpp"
+#include "tests/support/pixel_layouts.hpp"
 
 namespace stereotrack::test {
 
@@ -22,8 +23,14 @@ struct SceneFormat {
   void (*pack)(const std::vector<std::uint8_t>& bgr, int width, int height, std::vector<std::uint8_t>& out);
 };
 
+template <PixelFormat kFormat>
+void pack_as(const std::vector<std::uint8_t>& bgr, int width, int height, std::vector<std::uint8_t>& out) {
+  lay_out({bgr.data(), width, height, std::ptrdiff_t{width} * 3, PixelFormat::kBgr8}, kFormat,
+          std::ptrdiff_t{width} * bytes_per_pixel(kFormat), out);
+}
+
 /// Every format of pipeline/frame.hpp. A new one needs a line here and nothing else.
-inline constexpr std::array<SceneFormat, 2> kSceneFormats{
+inline constexpr std::array<SceneFormat, 5> kSceneFormats{
     {{"bgr8", PixelFormat::kBgr8, true,
       [](const std::vector<std::uint8_t>& bgr, int, int, std::vector<std::uint8_t>& out) { out = bgr; }},
      {"grey8", PixelFormat::kGrey8, false,
@@ -32,7 +39,10 @@ inline constexpr std::array<SceneFormat, 2> kSceneFormats{
         for (std::size_t i = 0; i < out.size(); ++i) {
           out[i] = static_cast<std::uint8_t>((bgr[3 * i] + 2 * bgr[3 * i + 1] + bgr[3 * i + 2] + 2) / 4);
         }
-      }}}};
+      }},
+     {"yuyv", PixelFormat::kYuyv, true, pack_as<PixelFormat::kYuyv>},
+     {"uyvy", PixelFormat::kUyvy, true, pack_as<PixelFormat::kUyvy>},
+     {"nv12", PixelFormat::kNv12, true, pack_as<PixelFormat::kNv12>}}};
 
 /// Textured boards before a textured wall, 160 x 120 px, two ideal cameras: integer shifts of noise, microseconds a
 /// pair. From frame 41 on one board goes to and fro, stops (frame 301), leaves (361); from 401 three boards cross each

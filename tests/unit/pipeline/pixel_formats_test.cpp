@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "drivers/capture/synthetic/synthetic_source.hpp"
-#include "pipeline/photometry/colour.hpp"
 #include "pipeline/pipeline.hpp"
+#include "tests/support/pixel_layouts.hpp"
 
 namespace stereotrack {
 namespace {
@@ -50,33 +50,9 @@ FramePair mono(const Picture& picture) {
   return pair;
 }
 
-/// As a camera would give it: luma of each pixel, chroma the mean over those that share it. Full range.
 Owned converted(const Picture& bgr, PixelFormat format) {
   Owned made = empty_picture(bgr.width, bgr.height, format, 6);
-  const auto row = [&](int y) { return made.bytes.data() + y * made.picture.stride_bytes; };
-  const int tall = format == PixelFormat::kNv12 ? 2 : 1;
-  for (int y = 0; y < bgr.height; y += tall) {
-    for (int x = 0; x < bgr.width; x += 2) {
-      int blue = 0;
-      int red = 0;
-      for (int v = y; v < y + tall; ++v) {
-        for (int u = x; u < x + 2; ++u) {
-          const std::uint8_t* pixel = bgr.row(v) + 3 * u;
-          const std::uint8_t grey = luma(pixel[0], pixel[1], pixel[2]);
-          blue += chroma_blue(pixel[0], grey);
-          red += chroma_red(pixel[2], grey);
-          if (format == PixelFormat::kNv12) row(v)[u] = grey;
-          if (format == PixelFormat::kYuyv) row(v)[2 * u] = grey;
-          if (format == PixelFormat::kUyvy) row(v)[2 * u + 1] = grey;
-        }
-      }
-      const auto mean = [tall](int sum) { return static_cast<std::uint8_t>((sum + tall) / (2 * tall)); };
-      const int first = format == PixelFormat::kYuyv ? 1 : 0;
-      std::uint8_t* pair = format == PixelFormat::kNv12 ? row(bgr.height + y / 2) + x : row(y) + 2 * x + first;
-      pair[0] = mean(blue);
-      pair[format == PixelFormat::kNv12 ? 1 : 2] = mean(red);
-    }
-  }
+  test::lay_out(bgr, format, made.picture.stride_bytes, made.bytes);
   return made;
 }
 
