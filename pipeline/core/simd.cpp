@@ -8,9 +8,26 @@ namespace stereotrack {
 
 namespace {
 
+// Later versions of Highway tell NEON with and without AES apart.
+#if defined(HWY_NEON_WITHOUT_AES)
+constexpr std::int64_t kHighwayNeon = HWY_NEON | HWY_NEON_WITHOUT_AES;
+#else
+constexpr std::int64_t kHighwayNeon = HWY_NEON;
+#endif
+
 // The sets of Highway's targets that one of ours stands for; within a set Highway takes the best.
 constexpr std::array<std::int64_t, kSimdTargets> kHighwayTargets{0, HWY_SSE4, HWY_AVX2, HWY_AVX3 | HWY_AVX3_DL,
-                                                                 HWY_NEON};
+                                                                 kHighwayNeon};
+
+// Of Highway's targets, those that this CPU runs. 64-bit ARM has NEON, always. Earlier versions of Highway count the
+// AES instructions to it, which the Cortex-A72 of a Raspberry Pi 4 lacks and no kernel uses: they are not asked.
+std::int64_t supported() noexcept {
+#if HWY_ARCH_ARM_A64 && !defined(HWY_NEON_WITHOUT_AES)
+  return HWY_NEON;
+#else
+  return hwy::SupportedTargets();
+#endif
+}
 
 struct Available {
   std::array<SimdTarget, kSimdTargets> targets{};
@@ -18,10 +35,10 @@ struct Available {
 };
 
 Available find_available() noexcept {
-  const std::int64_t supported = hwy::SupportedTargets() & HWY_TARGETS;
+  const std::int64_t runs = supported() & HWY_TARGETS;
   Available found;
   for (std::size_t i = 0; i < kSimdTargets; ++i) {
-    if (i == 0 || (supported & kHighwayTargets[i]) != 0) found.targets[found.count++] = static_cast<SimdTarget>(i);
+    if (i == 0 || (runs & kHighwayTargets[i]) != 0) found.targets[found.count++] = static_cast<SimdTarget>(i);
   }
   return found;
 }
@@ -38,7 +55,7 @@ bool use_simd(SimdTarget target) noexcept {
   if (std::find(targets.begin(), targets.end(), target) == targets.end()) return false;
   // Highway's own choice is narrowed, too: its tables of functions are indexed by it.
   if (target != SimdTarget::kScalar) {
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets() & kHighwayTargets[static_cast<std::size_t>(target)]);
+    hwy::GetChosenTarget().Update(supported() & kHighwayTargets[static_cast<std::size_t>(target)]);
   }
   in_use = target;
   return true;

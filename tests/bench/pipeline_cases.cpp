@@ -4,19 +4,16 @@
 #include <span>
 #include <stdexcept>
 
-#include "config/load.hpp"
 #include "drivers/capture/synthetic/synthetic_source.hpp"
 #include "pipeline/pipeline.hpp"
 #include "tests/bench/cases.hpp"
 #include "tests/bench/moving_boxes.hpp"
 #include "tests/bench/opencv_pipeline.hpp"
+#include "tests/bench/settings.hpp"
 
 namespace stereotrack::bench {
 
 namespace {
-
-// The act is under way.
-constexpr std::uint64_t kFirstFrame = 60;
 
 std::vector<std::string> stage_names() {
   std::vector<std::string> names;
@@ -47,26 +44,6 @@ Stage stage_of(CvStep step) noexcept {
     case CvStep::kTracking: break;
   }
   return Stage::kTracking;
-}
-
-config::Configuration configured(const std::vector<std::string>& settings) {
-  std::vector<config::Layer> layers;
-  layers.reserve(settings.size());
-  for (const std::string& setting : settings) layers.push_back(config::override_layer(setting));
-  return config::load(layers).configuration;
-}
-
-// The search range of both sides, for the dense map and for regions.
-std::vector<std::string> range_settings(int width, int disparities) {
-  return {"disparity.max=" + std::to_string(disparities - 1),
-          "disparity.reach=" + std::to_string(static_cast<double>(disparities) / width)};
-}
-
-// synthetic:eleven's cameras are ideal, which would make rectification copy pixels. With a lens that bends the corner
-// by a few pixels, alike in both views, both sides interpolate; rows still meet within 0.2 px.
-StereoCalibration with_lens(StereoCalibration calibration) {
-  calibration.left.distortion[0] = calibration.right.distortion[0] = -0.01;
-  return calibration;
 }
 
 cv::Mat camera_matrix(const CameraModel& camera) {
@@ -194,15 +171,12 @@ class Pass {
   }
   void add_theirs(int disparities) {
     const capture::SourceInfo& info = source_->info();
-    theirs_ = std::make_unique<Theirs>(configured(thesis_settings()).pipeline, disparities,
+    theirs_ = std::make_unique<Theirs>(configured(thesis()).pipeline, disparities,
                                        to_opencv(calibration_, {info.width, info.height}));
     contest_.add(
         name_ + "/opencv", [this] { theirs_->run(pair_, dt_); }, &theirs_->clock());
   }
-  // The document's preset as far as it does not depend on the picture; its mean is learnt when the warm-up ends.
-  [[nodiscard]] std::vector<std::string> thesis_settings() const {
-    return {"preset=thesis", "disparity.mode=dense", "background.frames=" + std::to_string(plan_.warm_up)};
-  }
+  [[nodiscard]] std::vector<std::string> thesis() const { return thesis_settings(plan_.warm_up); }
 
   void run(int warm_up, int frames) {
     contest_.reserve(static_cast<std::size_t>(frames));
@@ -261,11 +235,6 @@ class Pass {
   double dt_ = 0;
 };
 
-std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
 std::unique_ptr<Pass> eleven(const std::string& name, int width, int height, const Plan& plan,
                              const InstructionCounter& counter) {
   capture::SyntheticOptions options;
@@ -280,7 +249,7 @@ std::unique_ptr<Pass> eleven(const std::string& name, int width, int height, con
 
 void add_both(Pass& pass, const std::string& suffix, int width, int disparities) {
   const std::vector<std::string> range = range_settings(width, disparities);
-  pass.add_ours("thesis" + suffix, joined(pass.thesis_settings(), range));
+  pass.add_ours("thesis" + suffix, joined(pass.thesis(), range));
   pass.add_ours("robust" + suffix, joined({"preset=robust"}, range));
 }
 

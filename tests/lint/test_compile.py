@@ -20,30 +20,30 @@ ASSERT = re.compile(r"^static_assert\(RealTimeStage<(\w+),([^;]*)>\);$", re.M)
 BAD = {
     "throw": ("int f(int a) { if (a > 3) throw 3; return a; }", "exception"),
     "try": ("int f(int a) { try { return a; } catch (int) { return 3; } }", "exception"),
-    "typeid": ("#include <typeinfo>\nbool f(int a) { return typeid(a) == typeid(3); }", "-fno-rtti"),
+    "typeid": ("#include <typeinfo>\nbool f(int a) { return typeid(a) == typeid(3); }", "rtti"),
     "dynamic_cast": ("struct A { virtual void f(); }; struct B : A {}; B* f(A* a) { return dynamic_cast<B*>(a); }",
-                     "-fno-rtti"),
+                     "rtti"),
     "Result that nobody looks at": ('#include "pipeline/core/result.hpp"\n'
                                     "[[nodiscard]] stereotrack::Result<int> f(); void g() { f(); }", "nodiscard"),
     "function that may throw": ('#include "pipeline/core/stage.hpp"\nstruct A { void run(); };\n'
-                                "static_assert(stereotrack::RealTimeStage<A, &A::run>);", "static assertion failed"),
+                                "static_assert(stereotrack::RealTimeStage<A, &A::run>);", "static.assert"),
     "const function that may throw": ('#include "pipeline/core/stage.hpp"\nstruct A { void run(int) const; };\n'
                                       "static_assert(stereotrack::RealTimeStage<A, &A::run>);",
-                                      "static assertion failed"),
+                                      "static.assert"),
     "static function that may throw": ('#include "pipeline/core/stage.hpp"\nstruct A { static int run(); };\n'
                                        "static_assert(stereotrack::RealTimeStage<A, &A::run>);",
-                                       "static assertion failed"),
+                                       "static.assert"),
     "second of two functions that may throw":
         ('#include "pipeline/core/stage.hpp"\nstruct A { void run() noexcept; void learn(); };\n'
-         "static_assert(stereotrack::RealTimeStage<A, &A::run, &A::learn>);", "static assertion failed"),
+         "static_assert(stereotrack::RealTimeStage<A, &A::run, &A::learn>);", "static.assert"),
     "no function": ('#include "pipeline/core/stage.hpp"\nstruct A {};\nstatic_assert(stereotrack::RealTimeStage<A>);',
-                    "static assertion failed"),
+                    "static.assert"),
     "stage that owns memory":
         ('#include "pipeline/core/stage.hpp"\n#include <vector>\nstruct A { void run() noexcept; std::vector<int> a; };\n'
-         "static_assert(stereotrack::RealTimeStage<A, &A::run>);", "static assertion failed"),
+         "static_assert(stereotrack::RealTimeStage<A, &A::run>);", "static.assert"),
     "virtual stage":
-        ('#include "pipeline/core/stage.hpp"\nstruct A { virtual void run() noexcept; };\n'
-         "static_assert(stereotrack::RealTimeStage<A, &A::run>);", ""),
+        ('#include "pipeline/core/stage.hpp"\nstruct A final { virtual void run() noexcept; };\n'
+         "static_assert(stereotrack::RealTimeStage<A, &A::run>);", "static.assert"),
 }
 GOOD = """#include "pipeline/core/stage.hpp"
 struct A { int run(int) noexcept; void show() const noexcept; static int measure(int, int) noexcept; };
@@ -74,7 +74,7 @@ class Compile(unittest.TestCase):
             with self.subTest(name=name):
                 done = self.compile(code)
                 self.assertNotEqual(done.returncode, 0)
-                self.assertIn(said, done.stderr)
+                self.assertRegex(done.stderr, said)
 
     def test_good_code_passes(self):
         done = self.compile(GOOD)
@@ -103,8 +103,8 @@ class Compile(unittest.TestCase):
                     copy.write_text(text)
                     done = self.compile(f'#include "{name}"', copy.parents[len(pathlib.Path(name).parts) - 1])
                     self.assertNotEqual(done.returncode, 0)
-                    self.assertRegex(done.stderr, r"static assertion failed[\s\S]*RealTimeStage|RealTimeStage[\s\S]*"
-                                                  "static assertion failed")
+                    self.assertRegex(done.stderr, "static.assert")
+                    self.assertIn("RealTimeStage", done.stderr)
 
 
 if __name__ == "__main__":

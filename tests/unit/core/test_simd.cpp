@@ -1,6 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
+
+#if defined(__aarch64__)
+#include <sys/auxv.h>
+#endif
 
 #include "pipeline/core/simd.hpp"
 
@@ -35,6 +40,16 @@ TEST(Simd, AnotherMachinesTargetIsRefused) {
   }
   EXPECT_GE(refused, 1);  // no machine is both x86 and ARM
 }
+
+#if defined(__aarch64__)
+// Also where the CPU has no AES instructions, which Highway counts to its NEON: no_aes.c takes them away.
+TEST(Simd, NeonIsOnEvery64BitArm) {
+  if (std::getenv("STEREOTRACK_AES_IS_HIDDEN") != nullptr) {
+    ASSERT_EQ(getauxval(AT_HWCAP) & HWCAP_AES, 0U);
+  }
+  EXPECT_EQ(simd_targets().back(), SimdTarget::kNeon);
+}
+#endif
 
 }  // namespace
 }  // namespace stereotrack

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "tests/support/each_target.hpp"
-
 namespace stereotrack {
 namespace {
 
@@ -54,23 +52,6 @@ TEST(Smooth, AgreesWithTheNaiveSumAndWithOpencvAtAllSizes) {
     cv::GaussianBlur(in, theirs, {3, 3}, 0, 0, cv::BORDER_REPLICATE);
     EXPECT_EQ(cv::countNonZero(smoothed(in) != naive(in)), 0) << size;
     EXPECT_EQ(cv::countNonZero(smoothed(in) != theirs), 0) << size;
-  }
-}
-
-TEST(Smooth, EverySizeIsTheReferenceAndNothingBesideIsTouched) {
-  cv::Mat_<std::uint8_t> in(9, 205);
-  cv::RNG(4).fill(in, cv::RNG::UNIFORM, 0, 256);
-  for (int width = 1; width <= 140; ++width) {
-    for (const int height : {1, 2, 3, 9}) {
-      const ImageView<const std::uint8_t> from{in[0] + 1, width, height, 205};
-      cv::Mat_<std::uint8_t> expected(height, width + 2, std::uint8_t{77});
-      smooth3x3_reference(from, ImageView<std::uint8_t>{expected[0] + 1, width, height, width + 2});
-      test::on_each_target([&] {
-        cv::Mat_<std::uint8_t> got(height, width + 2, std::uint8_t{77});
-        smooth3x3(from, {got[0] + 1, width, height, width + 2});
-        EXPECT_EQ(cv::countNonZero(got != expected), 0) << width << " x " << height;
-      });
-    }
   }
 }
 

@@ -1,22 +1,24 @@
 #include <gtest/gtest.h>
 
-#include <opencv2/core.hpp>
+#include <algorithm>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/core/simd.hpp"
 #include "pipeline/stereo/census_matcher.hpp"
 #include "pipeline/stereo/median_kernel.hpp"
 #include "pipeline/stereo/sad_matcher.hpp"
-#include "stereo_pictures.hpp"
+#include "tests/support/grid.hpp"
 
 namespace stereotrack {
 namespace {
 
-using test::noise;
-using test::view;
-using test::writable;
+using test::Grid;
+using test::random_grid;
+using Grey = Grid<std::uint8_t>;
+using Map = Grid<std::uint16_t>;
 
 /// Every instruction set but the plain reference, which the others are compared with.
 class StereoSimd : public testing::TestWithParam<SimdTarget> {
@@ -80,38 +82,37 @@ std::vector<Case> cases() {
   return result;
 }
 
-/// Rows of odd length that start at odd addresses.
-cv::Mat odd(const cv::Mat& picture) {
-  cv::Mat wide(picture.rows, picture.cols + 5 - picture.cols % 2, picture.type(), cv::Scalar(77));
-  cv::Mat part = wide.colRange(1, 1 + picture.cols);
-  picture.copyTo(part);
-  return part;
-}
-
-cv::Mat blobs(int width, int height) {
-  cv::Mat mask(height, width, CV_8U, cv::Scalar(0));
+Grey blobs(int width, int height) {
+  Grey mask(width, height);
   for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x)
-      mask.at<std::uint8_t>(y, x) = (x / 11 + y / 4) % 3 == 0 && (x * y) % 7 != 3 ? 255 : 0;
+    for (int x = 0; x < width; ++x) mask.at(x, y) = (x / 11 + y / 4) % 3 == 0 && (x * y) % 7 != 3 ? 255 : 0;
   }
   return mask;
 }
 
+/// What the right camera sees: in the left half all of `left` has disparity d, noise beyond.
+Grey half_shifted(const Grey& left, int right_width, int d, int greys) {
+  Grey right = random_grid(right_width, left.height(), 0, greys, 2);
+  for (int y = 0; y < left.height(); ++y) {
+    for (int x = 0; x < std::min(left.width(), right_width) / 2; ++x) {
+      if (x + d >= 0 && x + d < left.width()) right.at(x, y) = left.at(x + d, y);
+    }
+  }
+  return right;
+}
+
 struct Output {
-  cv::Mat disparity;
+  Map disparity;
   std::vector<std::int64_t> counts;
 };
 
 template <class Matcher>
 Output matched(const Case& c, SimdTarget target, typename Matcher::Config config) {
   EXPECT_TRUE(use_simd(target));
-  const cv::Mat left = odd(noise(c.width, c.height, 1, 0, c.greys));
-  cv::Mat right = noise(c.right_width, c.height, 2, 0, c.greys);
+  const Grey left = random_grid(c.width, c.height, 0, c.greys, 1);
   // Half of it true matches, so that gates and sub-pixel have something to pass.
-  const cv::Mat shifted = test::shifted(left, c.range.min + c.range.count() / 2 + c.offset, 3);
-  for (int x = 0; x < std::min(c.width, c.right_width) / 2; ++x) shifted.col(x).copyTo(right.col(x));
-  right = odd(right);
-  const cv::Mat mask = c.masked ? odd(blobs(c.width, c.height)) : cv::Mat();
+  const Grey right = half_shifted(left, c.right_width, c.range.min + c.range.count() / 2 + c.offset, c.greys);
+  const Grey mask = blobs(c.width, c.height);
   config.width = c.width;
   config.height = c.height;
   config.right_width = c.right_width;
@@ -122,13 +123,13 @@ Output matched(const Case& c, SimdTarget target, typename Matcher::Config config
   auto matcher = Matcher::create(config, arena);
   EXPECT_TRUE(matcher.has_value());
   arena.seal();
-  Output out{odd(cv::Mat(c.height, c.width, CV_16U, cv::Scalar(4321))), {}};
+  Output out{Map(c.width, c.height, 4321), {}};
   // Twice, and the second time counts: nothing may be left over from another region.
-  cv::Mat other(c.height, c.width, CV_16U, cv::Scalar(0));
-  (void)matcher->run(view<std::uint8_t>(right.cols == left.cols ? right : left), view<std::uint8_t>(right),
-                     writable<std::uint16_t>(other));
-  const auto counts = matcher->run_region(view<std::uint8_t>(left), view<std::uint8_t>(right), c.roi,
-                                          view<std::uint8_t>(mask), c.range, writable<std::uint16_t>(out.disparity));
+  Map other(c.width, c.height);
+  (void)matcher->run(right.width() == left.width() ? right.view() : left.view(), right.view(), other.view());
+  const auto counts =
+      matcher->run_region(left.view(), right.view(), c.roi, c.masked ? mask.view() : ImageView<const std::uint8_t>{},
+                          c.range, out.disparity.view());
   EXPECT_TRUE(counts.has_value());
   EXPECT_FALSE(arena.failed());
   if (counts.has_value()) {
@@ -138,15 +139,13 @@ Output matched(const Case& c, SimdTarget target, typename Matcher::Config config
   return out;
 }
 
-bool equal(const cv::Mat& a, const cv::Mat& b) { return a.size() == b.size() && cv::countNonZero(a != b) == 0; }
-
 template <class Matcher>
 std::int64_t expect_equal_to_reference(SimdTarget target, const typename Matcher::Config& config) {
   std::int64_t pixels = 0;
   for (const Case& c : cases()) {
     const Output plain = matched<Matcher>(c, SimdTarget::kScalar, config);
     const Output lanes = matched<Matcher>(c, target, config);
-    EXPECT_TRUE(equal(plain.disparity, lanes.disparity)) << c;
+    EXPECT_TRUE(plain.disparity == lanes.disparity) << c;
     EXPECT_EQ(plain.counts, lanes.counts) << c;
     pixels += plain.counts[1];
   }
@@ -183,23 +182,20 @@ TEST_P(StereoSimd, MedianEqualsTheReferenceBitForBit) {
   for (const int width : {1, 2, 3, 8, 9, 10, 16, 17, 18, 33, 34, 35, 100}) {
     for (const int height : {1, 2, 3, 8}) {
       for (const int holes : {0, 30, 150, 256}) {
-        cv::Mat in(height, width, CV_16U);
-        const cv::Mat values = noise(width, height, 5);
-        const cv::Mat missing = noise(width, height, 6);
+        Map in(width, height);
+        const Grey values = random_grid(width, height, 0, 255, 5);
+        const Grey missing = random_grid(width, height, 0, 255, 6);
         for (int y = 0; y < height; ++y) {
           for (int x = 0; x < width; ++x) {
-            in.at<std::uint16_t>(y, x) = missing.at<std::uint8_t>(y, x) < holes
-                                             ? kNoDisparity
-                                             : static_cast<std::uint16_t>(values.at<std::uint8_t>(y, x) * 250);
+            in.at(x, y) = missing.at(x, y) < holes ? kNoDisparity : static_cast<std::uint16_t>(values.at(x, y) * 250);
           }
         }
-        in = odd(in);
-        cv::Mat plain = odd(cv::Mat(height, width, CV_16U, cv::Scalar(1)));
-        cv::Mat lanes = odd(cv::Mat(height, width, CV_16U, cv::Scalar(2)));
+        Map plain(width, height, 1);
+        Map lanes(width, height, 2);
         const std::vector<std::uint16_t> none(static_cast<std::size_t>(width), kNoDisparity);
-        median_reference(view<std::uint16_t>(in), writable<std::uint16_t>(plain));
-        median_lanes(view<std::uint16_t>(in), none, writable<std::uint16_t>(lanes));
-        ASSERT_TRUE(equal(plain, lanes)) << width << 'x' << height << " holes " << holes;
+        median_reference(std::as_const(in).view(), plain.view());
+        median_lanes(std::as_const(in).view(), none, lanes.view());
+        ASSERT_TRUE(plain == lanes) << width << 'x' << height << " holes " << holes;
       }
     }
   }

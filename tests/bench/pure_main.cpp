@@ -1,0 +1,367 @@
+// The pure part of the project as a program that needs no OpenCV, for CPUs that there is only an emulator of. Drawing
+// takes an emulator longest, so pairs come through a pipe from this program as it runs on the machine itself:
+//     stereotrack_pure pairs A:B ...    pairs of synthetic:eleven to standard output, 1.8 MB each
+//     stereotrack_pure results          what the pipeline makes of pairs, a hash a frame: the same on every machine
+//     stereotrack_pure work             matchers and pipelines, marked for whoever counts instructions (mark.hpp)
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "drivers/capture/synthetic/synthetic_source.hpp"
+#include "drivers/telemetry/encoder.hpp"
+#include "pipeline/core/simd.hpp"
+#include "pipeline/photometry/gray.hpp"
+#include "pipeline/pipeline.hpp"
+#include "pipeline/stereo/census_matcher.hpp"
+#include "pipeline/stereo/sad_matcher.hpp"
+#include "tests/bench/mark.hpp"
+#include "tests/bench/settings.hpp"
+
+namespace stereotrack::bench {
+
+namespace {
+
+constexpr int kWidth = 640;
+constexpr int kHeight = 480;
+constexpr int kDisparities = 64;
+
+// FNV-1a, 64 bits: Fowler, Noll, Vo. It finds differences, nothing else.
+class Hash {
+ public:
+  void add(std::span<const std::byte> bytes) noexcept {
+    for (const std::byte byte : bytes) value_ = (value_ ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3U;
+  }
+  template <class T>
+  void add_value(const T& value) noexcept {
+    static_assert(std::has_unique_object_representations_v<T> || std::is_floating_point_v<T>);
+    add(std::as_bytes(std::span(&value, 1)));
+  }
+  template <class T>
+  void add(ImageView<T> picture) noexcept {
+    for (int y = 0; y < picture.height; ++y) {
+      add(std::as_bytes(std::span(picture.row(y), static_cast<std::size_t>(picture.width))));
+    }
+  }
+  [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325U;
+};
+
+void add_track(Hash& hash, const TrackReport& track) {
+  hash.add_value(track.id);
+  hash.add_value(track.state);
+  hash.add_value(track.measured);
+  hash.add_value(track.has_depth);
+  for (const int edge : {track.box.left, track.box.top, track.box.width, track.box.height}) hash.add_value(edge);
+  for (const Point& corner : track.hull) {
+    hash.add_value(corner.x);
+    hash.add_value(corner.y);
+  }
+  for (const double value :
+       {track.image_x, track.image_y, track.image_vx, track.image_vy, track.confidence, track.age_s}) {
+    hash.add_value(value);
+  }
+  hash.add(std::as_bytes(std::span(track.position.data(), 3)));
+  hash.add(std::as_bytes(std::span(track.velocity.data(), 3)));
+  hash.add(std::as_bytes(std::span(track.covariance.data(), 36)));
+}
+
+// A pipeline with its memory, on frames of synthetic:eleven.
+class Tracked {
+ public:
+  Tracked(const std::vector<std::string>& settings, const StereoCalibration& calibration, StageObserver observer = {})
+      : pipeline_(make(configured(settings).pipeline, calibration, observer)) {
+    arena_.seal();
+  }
+  FrameResult run(const FramePair& pair) {
+    const Result<FrameResult> result = pipeline_.run(pair);
+    if (!result.has_value()) throw std::runtime_error(std::string("the pipeline: ") + to_string(result.error()));
+    return *result;
+  }
+
+ private:
+  Pipeline make(const PipelineConfig& config, const StereoCalibration& calibration, StageObserver observer) {
+    Pipeline::Setup setup;
+    setup.width = kWidth;
+    setup.height = kHeight;
+    setup.colour = true;
+    setup.calibration = &calibration;
+    setup.observer = observer;
+    const Result<Pipeline> made = Pipeline::create(config, setup, arena_);
+    if (!made.has_value()) throw std::runtime_error(std::string("the pipeline: ") + to_string(made.error()));
+    return *made;
+  }
+
+  Arena arena_;
+  Pipeline pipeline_;
+};
+
+// ---------------------------------------------------------------- pairs
+
+constexpr std::size_t kPictureBytes = std::size_t{3} * kWidth * kHeight;
+
+// What stands before each pair's two pictures, in the order of bytes that all our machines have.
+struct PairHeader {
+  std::uint64_t ordinal = 0;
+  std::int64_t capture_time_ns = 0;
+};
+
+// The cameras of synthetic:eleven: ideal.
+StereoCalibration ideal_cameras() { return capture::synthetic::Rig().calibration(kWidth, kHeight); }
+
+void put(const void* data, std::size_t bytes) {
+  if (std::fwrite(data, 1, bytes, stdout) != bytes) throw std::runtime_error("standard output takes no more");
+}
+
+void write_pairs(const std::vector<std::pair<std::uint64_t, std::uint64_t>>& ranges) {
+  const auto source = capture::open_synthetic("eleven");
+  for (const auto& [first, last] : ranges) {
+    source->skip_to(first - 1);
+    for (std::uint64_t ordinal = first; ordinal <= last; ++ordinal) {
+      FramePair pair;
+      if (source->next(pair) != capture::Next::kPair) throw std::runtime_error("synthetic:eleven has no such pair");
+      const PairHeader header{pair.ordinal, pair.capture_time.time_since_epoch().count()};
+      put(&header, sizeof header);
+      for (const Picture* picture : {&pair.left, &pair.right}) {
+        for (int y = 0; y < kHeight; ++y) put(picture->row(y), std::size_t{3} * kWidth);
+      }
+    }
+  }
+}
+
+// Pairs from standard input; their pixels last until the next one is read.
+class PairReader {
+ public:
+  // False at the end.
+  bool next(FramePair& pair) {
+    PairHeader header;
+    const std::size_t got = std::fread(&header, 1, sizeof header, stdin);
+    if (got == 0) return false;
+    if (got != sizeof header || std::fread(pixels_.data(), 1, pixels_.size(), stdin) != pixels_.size()) {
+      throw std::runtime_error("standard input ends within a pair");
+    }
+    pair = {};
+    pair.ordinal = header.ordinal;
+    pair.capture_time = CaptureTime(std::chrono::nanoseconds(header.capture_time_ns));
+    pair.left = {pixels_.data(), kWidth, kHeight, std::ptrdiff_t{3} * kWidth, PixelFormat::kBgr8};
+    pair.right = pair.left;
+    pair.right.data += kPictureBytes;
+    return true;
+  }
+  FramePair next() {
+    FramePair pair;
+    if (!next(pair)) throw std::runtime_error("standard input has too few pairs");
+    return pair;
+  }
+
+ private:
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(2 * kPictureBytes);
+};
+
+// ---------------------------------------------------------------- results
+
+// A preset on all frames, and what came of it.
+class Results {
+ public:
+  Results(const std::string& preset, const StereoCalibration& calibration)
+      : tracked_({"preset=" + preset}, calibration),
+        focal_(calibration.left.fx, calibration.left.fy),
+        encoder_({.rig = 1, .session = 1}) {}
+
+  std::uint64_t of(const FramePair& pair) {
+    const FrameResult result = tracked_.run(pair);
+    Hash hash;
+    hash.add_value(result.flags);
+    for (const TrackReport& track : result.tracks) add_track(hash, track);
+    hash.add(result.mask);
+    hash.add(result.labels);
+    for (const auto count : result.rejections) hash.add_value(count);
+    telemetry::Message message;
+    message.tracks = result.tracks;
+    message.ordinal = pair.ordinal;
+    message.capture_time = pair.capture_time;
+    message.send_time = pair.capture_time;
+    message.unit_m = 1;
+    message.focal_x_px = focal_.x();
+    message.focal_y_px = focal_.y();
+    for (const std::span<const std::byte> datagram : encoder_.encode(message, buffer_)) hash.add(datagram);
+    for (const TrackReport& track : result.tracks) confirmed_ += track.state == TrackState::kConfirmed ? 1U : 0U;
+    return hash.value();
+  }
+  /// Over all frames.
+  [[nodiscard]] unsigned confirmed() const noexcept { return confirmed_; }
+
+ private:
+  Tracked tracked_;
+  Eigen::Vector2d focal_;
+  telemetry::Encoder encoder_;
+  std::array<std::byte, telemetry::kMaxMessageBytes> buffer_{};
+  unsigned confirmed_ = 0;
+};
+
+void print_results(bool lens) {
+  const StereoCalibration calibration = lens ? with_lens(ideal_cameras()) : ideal_cameras();
+  Results robust("robust", calibration);
+  Results thesis("thesis", calibration);
+  PairReader pairs;
+  std::printf("frame robust thesis\n");
+  for (FramePair pair; pairs.next(pair);) {
+    std::printf("%llu %016llx %016llx\n", static_cast<unsigned long long>(pair.ordinal),
+                static_cast<unsigned long long>(robust.of(pair)), static_cast<unsigned long long>(thesis.of(pair)));
+  }
+  std::printf("confirmed %u %u\n", robust.confirmed(), thesis.confirmed());
+}
+
+// ---------------------------------------------------------------- work
+
+// A matcher on the rectified pair that the benchmark's matchers have: the cameras of synthetic:eleven are ideal.
+template <class Matcher>
+void mark_matcher(Marks& marks, const std::string& name, const FramePair& pair, int calls) {
+  Arena arena;
+  const ImageView<std::uint8_t> left = arena.image<std::uint8_t>(kWidth, kHeight);
+  const ImageView<std::uint8_t> right = arena.image<std::uint8_t>(kWidth, kHeight);
+  const ImageView<std::uint16_t> out = arena.image<std::uint16_t>(kWidth, kHeight);
+  gray(pair.left, left);
+  gray(pair.right, right);
+  typename Matcher::Config config;
+  config.width = kWidth;
+  config.height = kHeight;
+  config.block = 9;
+  config.range = {0, kDisparities - 1};
+  Result<Matcher> matcher = Matcher::create(config, arena);
+  if (!matcher.has_value()) throw std::runtime_error(name + ": " + to_string(matcher.error()));
+  const std::size_t number = marks.number_of(name);
+  (void)matcher->run(left, right, out);
+  for (int i = 0; i < calls; ++i) {
+    marks.begin();
+    (void)matcher->run(left, right, out);
+    marks.was(number);
+    marks.end();
+  }
+}
+
+// A pipeline whose stages are marked, NAME/STAGE.
+class MarkedPipeline {
+ public:
+  MarkedPipeline(Marks& marks, const std::string& name, const std::vector<std::string>& settings,
+                 const StereoCalibration& calibration)
+      : marks_(marks), tracked_(settings, calibration, {&MarkedPipeline::stage_ended, this}) {
+    for (std::size_t i = 0; i < kStages; ++i) {
+      stages_[i] = marks.number_of(name + "/" + to_string(static_cast<Stage>(i)));
+    }
+    rest_ = marks.number_of(name + "/rest");
+  }
+  MarkedPipeline(const MarkedPipeline&) = delete;
+  MarkedPipeline& operator=(const MarkedPipeline&) = delete;
+
+  void run(const FramePair& pair, bool counts) {
+    counts_ = counts;
+    if (counts) marks_.begin();
+    (void)tracked_.run(pair);
+    if (!counts) return;
+    marks_.was(rest_);
+    marks_.end();
+  }
+
+ private:
+  static void stage_ended(void* self, Stage stage) noexcept {
+    const auto& pipeline = *static_cast<MarkedPipeline*>(self);
+    if (pipeline.counts_) pipeline.marks_.was(pipeline.stages_[static_cast<std::size_t>(stage)]);
+  }
+
+  Marks& marks_;
+  Tracked tracked_;
+  std::array<std::size_t, kStages> stages_{};
+  std::size_t rest_ = 0;
+  bool counts_ = false;
+};
+
+void work(int warm_up) {
+  Marks marks;
+  PairReader pairs;
+  {
+    const FramePair pair = pairs.next();
+    mark_matcher<SadMatcher>(marks, "sad_dense", pair, 2);
+    mark_matcher<CensusMatcher>(marks, "census_dense", pair, 2);
+  }
+  const StereoCalibration calibration = with_lens(ideal_cameras());
+  const std::vector<std::string> range = range_settings(kWidth, kDisparities);
+  MarkedPipeline thesis(marks, "thesis", joined(thesis_settings(warm_up), range), calibration);
+  MarkedPipeline robust(marks, "robust", joined({"preset=robust"}, range), calibration);
+  MarkedPipeline shipped(marks, "robust_as_shipped", {"preset=robust"}, calibration);
+  int frames = -warm_up;
+  for (FramePair pair; pairs.next(pair); ++frames) {
+    for (MarkedPipeline* pipeline : {&thesis, &robust, &shipped}) pipeline->run(pair, frames >= 0);
+  }
+  if (frames <= 0) throw std::runtime_error("standard input has too few pairs");
+  std::printf("simd %s\n", to_string(simd_in_use()));
+  for (std::size_t i = 0; i < marks.names().size(); ++i) std::printf("%zu %s\n", i + 1, marks.names()[i].c_str());
+}
+
+std::vector<std::pair<std::uint64_t, std::uint64_t>> parse_ranges(const std::vector<std::string>& texts) {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;
+  for (const std::string& text : texts) {
+    unsigned long long first = 0;
+    unsigned long long last = 0;
+    int end = 0;
+    if (std::sscanf(text.c_str(), "%llu:%llu%n", &first, &last, &end) != 2 || end != static_cast<int>(text.size()) ||
+        first == 0 || last < first) {
+      throw std::runtime_error(text + ": want A:B, ordinals from 1");
+    }
+    ranges.emplace_back(first, last);
+  }
+  return ranges;
+}
+
+}  // namespace
+}  // namespace stereotrack::bench
+
+int main(int argc, char** argv) {
+  CLI::App app("The pipeline on synthetic:eleven, 640x480, without OpenCV.");
+  app.require_subcommand(1);
+  std::vector<std::string> ranges;
+  CLI::App* pairs = app.add_subcommand("pairs", "draws pairs, to standard output");
+  pairs->add_option("RANGES", ranges, "A:B, ordinals from 1, both included")->required();
+  CLI::App* results =
+      app.add_subcommand("results", "reads pairs; prints a hash of each preset's results, a frame a line");
+  std::string simd;
+  bool lens = false;
+  results->add_option("--simd", simd, "instruction set: scalar, sse4, avx2, avx512, neon; else the best");
+  results->add_flag("--lens", lens, "with a lens that makes rectification interpolate");
+  int warm_up = 32;
+  CLI::App* work = app.add_subcommand(
+      "work",
+      "reads a pair for the matchers, and those of which the pipelines' count; prints the numbers of the marks");
+  work->add_option("--warm-up", warm_up, "pairs that do not count, in which backgrounds are learnt")
+      ->check(CLI::Range(1, 400))
+      ->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    if (!simd.empty()) {
+      const auto targets = stereotrack::simd_targets();
+      const auto named = std::find_if(targets.begin(), targets.end(),
+                                      [&](stereotrack::SimdTarget target) { return simd == to_string(target); });
+      if (named == targets.end() || !stereotrack::use_simd(*named)) {
+        throw std::runtime_error("--simd " + simd + ": not of this build and CPU");
+      }
+    }
+    if (pairs->parsed()) stereotrack::bench::write_pairs(stereotrack::bench::parse_ranges(ranges));
+    if (results->parsed()) stereotrack::bench::print_results(lens);
+    if (work->parsed()) stereotrack::bench::work(warm_up);
+    if (std::fflush(stdout) != 0) throw std::runtime_error("standard output takes no more");
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "stereotrack_pure: %s\n", error.what());
+    return 1;
+  }
+}
