@@ -10,6 +10,7 @@ namespace {
 
 constexpr int kReach = kPatchReach;
 constexpr int kArea = kPatchArea;
+constexpr int kTensorArea = (2 * kTensorReach + 1) * (2 * kTensorReach + 1);
 // Where a patch was found to about this many pixels.
 constexpr double kSearchNoise = 0.4;
 
@@ -67,8 +68,7 @@ double smaller_eigenvalue(const Tensor& tensor) noexcept {
   const auto sum = static_cast<double>(tensor.a + tensor.c);
   const auto apart = static_cast<double>(tensor.a - tensor.c);
   const auto mixed = static_cast<double>(2 * tensor.b);
-  constexpr double kWindow = (2 * kTensorReach + 1) * (2 * kTensorReach + 1);
-  return 0.5 * (sum - std::sqrt(apart * apart + mixed * mixed)) / kWindow;
+  return 0.5 * (sum - std::sqrt(apart * apart + mixed * mixed)) / kTensorArea;
 }
 
 }  // namespace
@@ -133,6 +133,7 @@ void Features::refill(ImageView<const std::uint8_t> luma, ImageView<const std::u
   if (inside.empty() || set.size() == Set::capacity()) return;
   static_assert(kReach > kTensorReach, "where a patch fits, a tensor does, too");
   const auto least = static_cast<float>(config_.corner_quality);
+  const int least_sum = config_.corner_quality * kTensorArea;
   std::ptrdiff_t count = 0;
   const Rect fitting = intersect(inside, grown({0, 0, luma.width, luma.height}, -kReach));
   std::array<Tensor, kMostTensors> row;
@@ -141,8 +142,10 @@ void Features::refill(ImageView<const std::uint8_t> luma, ImageView<const std::u
       const int places = std::min(fitting.right() - left, kMostTensors);
       tensors(luma, left, y, places, row.data());
       for (int i = 0; i < places; ++i) {
-        if (labels.at(left + i, y) != label) continue;
-        const auto strength = static_cast<float>(smaller_eigenvalue(row[static_cast<std::size_t>(i)]));
+        const Tensor& tensor = row[static_cast<std::size_t>(i)];
+        // The smaller eigenvalue is no more than a and no more than c.
+        if (labels.at(left + i, y) != label || std::min(tensor.a, tensor.c) <= least_sum) continue;
+        const auto strength = static_cast<float>(smaller_eigenvalue(tensor));
         if (strength > least)
           corners_[count++] = {static_cast<std::uint16_t>(left + i), static_cast<std::uint16_t>(y), strength};
       }
