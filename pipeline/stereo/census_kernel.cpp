@@ -53,13 +53,22 @@ constexpr std::array<Neighbour, 24> kNeighbours = [] {
   return white;
 }();
 
-/// Multiplied by it and shifted by 24, costs of up to 21 x 21 x 24 x 21 are divided by 1..21 exactly.
-constexpr int kInverseBits = 24;
-constexpr std::array<std::uint64_t, 22> kInverse = [] {
-  std::array<std::uint64_t, 22> inverse{};
-  for (std::size_t n = 1; n < inverse.size(); ++n) inverse[n] = (std::uint64_t{1} << kInverseBits) / n + 1;
-  return inverse;
-}();
+/// Multiplied by it and shifted, the cost of a window of so many columns becomes that of a whole one: divided exactly.
+constexpr int kFactorBits = 17;
+constexpr std::uint32_t factor_of(int block, int columns) noexcept {
+  return static_cast<std::uint32_t>(block * (((1 << kFactorBits) + columns - 1) / columns));
+}
+constexpr bool factors_divide(int block) noexcept {
+  for (int columns = 1; columns <= block; ++columns) {
+    for (int cost = 0; cost <= 24 * block * columns; ++cost) {
+      const std::uint32_t scaled = static_cast<std::uint32_t>(cost) * factor_of(block, columns) >> kFactorBits;
+      if (scaled != static_cast<std::uint32_t>(cost * block / columns)) return false;
+    }
+  }
+  return true;
+}
+static_assert(factors_divide(3) && factors_divide(5) && factors_divide(7) && factors_divide(9));
+static_assert(kLargestCensusLaneBlock == 9);
 
 /// Bit i is set where neighbour i is not darker than the centre. (Distances do not mind which way round.)
 std::uint32_t census_code(const ImageView<const std::uint8_t>& picture, int x, int y) noexcept {
@@ -242,9 +251,8 @@ class CensusLanes {
     std::fill_n(s_.partner_missing.data(), layout_.partners, kNoKey);
     std::fill_n(s_.partner_missing.data() + layout_.first_partner, layout_.end_partner - layout_.first_partner,
                 std::uint16_t{0});
-    for (int columns = 1; columns <= block_; ++columns) {
-      factors_[columns] = static_cast<std::uint64_t>(block_) * kInverse[static_cast<std::size_t>(columns)];
-    }
+    for (int columns = 1; columns <= block_; ++columns) factors_[columns] = factor_of(block_, columns);
+    for (int p = 0; p < 2 * kEdge; ++p) by_partner_[p] = factors_[std::min(p + radius_ + 1, block_)];
     for (int i = 0; i < layout_.columns; ++i) {
       s_.limits[static_cast<std::size_t>(i)] = WindowLimits(task_.geometry, layout_.first_column + i);
     }
@@ -260,6 +268,7 @@ class CensusLanes {
   /// Of the keys: a pixel's 32 disparities of a group, and room beside them that no bid comes from.
   static constexpr int kKeyStride = kLaneStep + kVector;
   static constexpr int kGroupStride = kBatch * kKeyStride;
+  static constexpr int kEdge = kLargestCensusLaneBlock / 2;
   static_assert(kKeyStride <= CensusScratch::kMostKeyStride);
 
   /// Vectors of bytes that hold as many lanes as kVectors of 16 bits.
@@ -540,19 +549,41 @@ class CensusLanes {
   void scale_clipped(int x, int j) const {
     const BlockGeometry& g = task_.geometry;
     const WindowLimits limits = s_.limits[static_cast<std::size_t>(x - layout_.first_column)];
+    const int columns = g.columns(x);
     std::uint16_t* const row = keys(0, j);
-    const int last_lane = layout_.count - 1;
-    const auto scale = [row, last_lane](int id, std::uint64_t by) HWY_ATTR {
+    const auto at = [row, last_lane = layout_.count - 1](int id) HWY_ATTR {
       const int lane = last_lane - id;
-      std::uint16_t& scaled = row[(lane >> kIdBits) * kGroupStride + (lane & (kLaneStep - 1))];
-      const std::uint64_t cost = ((scaled >> kIdBits) * by) >> kInverseBits;
+      return row + (lane >> kIdBits) * kGroupStride + (lane & (kLaneStep - 1));
+    };
+    if (columns == block_ && limits.first == limits.first_whole) {
+      if (limits.end == limits.end_whole) return;
+      // Clipped by the right picture's first column alone: at most half a block of neighbouring lanes.
+      std::uint16_t* const first = at(limits.end - 1);
+      if (((layout_.count - limits.end) & (kLaneStep - 1)) <= kLaneStep - kEdge) {
+        scale_edge(first, by_partner_ + (x - g.offset - (g.range.min + limits.end - 1)));
+        return;
+      }
+    }
+    const auto scale = [&](int id, std::uint32_t by) HWY_ATTR {
+      std::uint16_t& scaled = *at(id);
+      const std::uint32_t cost = ((scaled >> kIdBits) * by) >> kFactorBits;
       scaled = static_cast<std::uint16_t>((cost << kIdBits) | (scaled & (kLaneStep - 1)));
     };
     for (int id = limits.first; id < limits.first_whole; ++id) scale(id, factors_[g.columns(x, g.range.min + id)]);
     for (int id = limits.end_whole; id < limits.end; ++id) scale(id, factors_[g.columns(x, g.range.min + id)]);
-    const int columns = g.columns(x);
     if (columns == block_) return;
     for (int id = limits.first_whole; id < limits.end_whole; ++id) scale(id, factors_[columns]);
+  }
+
+  static HWY_INLINE void scale_edge(std::uint16_t* keys, const std::uint32_t* factors) {
+    const hn::FixedTag<std::uint32_t, kEdge> wide;
+    const hn::RebindToSigned<decltype(wide)> wide_signed;
+    const hn::FixedTag<std::uint16_t, kEdge> narrow;
+    const auto key = hn::PromoteTo(wide, hn::LoadU(narrow, keys));
+    const auto cost = hn::ShiftRight<kFactorBits>(hn::Mul(hn::ShiftRight<kIdBits>(key), hn::LoadU(wide, factors)));
+    const auto id = hn::And(key, hn::Set(wide, std::uint32_t{kLaneStep - 1}));
+    const auto scaled = hn::Or(hn::ShiftLeft<kIdBits>(cost), id);
+    hn::StoreU(hn::DemoteTo(narrow, hn::BitCast(wide_signed, scaled)), narrow, keys);
   }
 
   static HWY_INLINE Vec smallest_of_group(const std::uint16_t* keys) {
@@ -591,10 +622,8 @@ class CensusLanes {
     HWY_ALIGN std::uint16_t costs[kBatch];      ///< smallest of all
     HWY_ALIGN std::uint16_t ids[kBatch];        ///< and of which d - range.min
     HWY_ALIGN std::uint16_t gradients[kBatch];  ///< sum over the window
-    HWY_ALIGN std::uint16_t before[kBatch];     ///< key of the next smaller disparity
-    HWY_ALIGN std::uint16_t after[kBatch];      ///< and of the next larger
-    HWY_ALIGN std::int32_t lanes[kBatch];       ///< of the smallest
-    HWY_ALIGN std::int32_t places[kBatch];      ///< in a row of keys
+    HWY_ALIGN std::uint64_t around[kBatch];     ///< key of the next larger disparity, and of the next smaller << 32
+    HWY_ALIGN std::int32_t places[kBatch];      ///< of the smallest, in a row of keys
     HWY_ALIGN std::int32_t shift[kBatch];       ///< sub-pixel [1/16 px]
     HWY_ALIGN std::int32_t area[kBatch];        ///< of the window [px]
     HWY_ALIGN std::int32_t wanted[kBatch];      ///< 0 or 1
@@ -658,27 +687,23 @@ class CensusLanes {
   HWY_INLINE void find_rivals(Groups groups, int size, Pixels& pixels) const {
     const int last_lane = layout_.count - 1;
     const auto place = [](int lane) HWY_ATTR { return (lane >> kIdBits) * kGroupStride + (lane & (kLaneStep - 1)); };
-    for (int j = 0; j < kBatch; ++j) pixels.lanes[j] = last_lane - pixels.ids[j];
-    for (int j = 0; j < kBatch; ++j) pixels.places[j] = place(pixels.lanes[j]);
+    for (int j = 0; j < kBatch; ++j) pixels.places[j] = place(last_lane - pixels.ids[j]);
     std::uint16_t* row = keys(0, 0);
     for (int j = 0; j < size; ++j, row += kKeyStride) {
-      const int lane = pixels.lanes[j];
-      if (((lane + 1) & (kLaneStep - 1)) > 1) {
+      const int at = pixels.places[j];
+      std::uint64_t four;
+      if (((at + 1) & (kLaneStep - 1)) > 1) {
         // All three in one access, and one more cell that stays.
-        std::uint16_t* const after = row + pixels.places[j] - 1;
-        std::uint64_t four;
-        std::memcpy(&four, after, sizeof four);
-        pixels.after[j] = static_cast<std::uint16_t>(four);
-        pixels.before[j] = static_cast<std::uint16_t>(four >> 32);
-        four |= 0xFFFF'FFFF'FFFF;
-        std::memcpy(after, &four, sizeof four);
+        std::memcpy(&four, row + at - 1, sizeof four);
+        const std::uint64_t rest = four | 0xFFFF'FFFF'FFFF;
+        std::memcpy(row + at - 1, &rest, sizeof rest);
       } else {
-        std::uint16_t& before = row[place(lane + 1)];
-        std::uint16_t& after = row[place(lane - 1)];
-        pixels.before[j] = before;
-        pixels.after[j] = after;
-        before = after = row[pixels.places[j]] = kNoKey;
+        std::uint16_t& before = row[place(last_lane - pixels.ids[j] + 1)];
+        std::uint16_t& after = row[place(last_lane - pixels.ids[j] - 1)];
+        four = after | std::uint64_t{before} << 32;
+        before = after = row[at] = kNoKey;
       }
+      pixels.around[j] = four;
     }
     if (task_.uniqueness <= 0) return;
     if (groups.end - groups.begin == 2) {
@@ -695,8 +720,12 @@ class CensusLanes {
     const hn::Rebind<std::uint16_t, decltype(d)> narrow;
     for (int j = 0; j < size; j += static_cast<int>(hn::MaxLanes(d))) {
       const auto cost = hn::PromoteTo(d, hn::Load(narrow, pixels.costs + j));
-      const auto before = hn::PromoteTo(d, hn::ShiftRight<kIdBits>(hn::Load(narrow, pixels.before + j)));
-      const auto after = hn::PromoteTo(d, hn::ShiftRight<kIdBits>(hn::Load(narrow, pixels.after + j)));
+      hn::VFromD<decltype(d)> after;
+      hn::VFromD<decltype(d)> before;
+      hn::LoadInterleaved2(d, reinterpret_cast<const std::int32_t*>(pixels.around + j), after, before);
+      const auto low = hn::Set(d, 0xFFFF);
+      after = hn::ShiftRight<kIdBits>(hn::And(after, low));
+      before = hn::ShiftRight<kIdBits>(hn::And(before, low));
       const auto slope = hn::Sub(hn::Max(before, after), cost);
       const auto difference = hn::Sub(before, after);
       auto left = hn::Sub(hn::ShiftLeft<4>(hn::Abs(difference)), slope);
@@ -869,7 +898,8 @@ class CensusLanes {
   int first_row_ = 0;
   int entering_ = 0;  ///< row
   bool enters_ = false;
-  std::uint64_t factors_[kLargestCensusLaneBlock + 1] = {};  ///< by which costs of so many columns are scaled
+  std::uint32_t factors_[kLargestCensusLaneBlock + 1] = {};  ///< [columns], see factor_of()
+  std::uint32_t by_partner_[2 * kEdge] = {};                 ///< [right column], likewise
   Pixels pixels_{};
   DisparityCounts counts_;
 };
