@@ -60,7 +60,7 @@ Result<DisparityCounts> CensusMatcher::run_region(ImageView<const std::uint8_t> 
                   raw_};
   const Rect& box = task.wanted.box;
   if (box.empty()) return DisparityCounts{};
-  const bool plain = simd_in_use() == SimdTarget::kScalar;
+  const bool plain = simd_in_use() == SimdTarget::kScalar || c.block > kLargestCensusLaneBlock;
   DisparityCounts counts = plain ? census_reference(task, scratch_) : census_lanes(task, scratch_);
   const auto part = [&](auto picture) { return picture.window(box.left, box.top, box.width, box.height); };
   filter_.run(part(raw_), mask.empty() ? mask : part(mask), part(out), counts);

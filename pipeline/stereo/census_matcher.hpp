@@ -31,8 +31,9 @@ namespace stereotrack {
 /// (range outside the stated maximum) at run, `out` then untouched.
 /// Cost: O(1) a pixel and disparity whatever the block: one Hamming distance, two column sums into the window,
 /// one comparison for the right view; in vector lanes, see census_kernel.hpp. A region costs (area + its margin of half
-/// a block) x range, in memory too.
-/// Memory: (block + 2) bytes x width x largest range, 20 bytes a pixel for the filter. One instance a thread.
+/// a block) x range, in memory too; candidates outside of the right picture cost nothing. Blocks over
+/// kLargestCensusLaneBlock take the plain way.
+/// Memory: (block + 3) bytes x width x largest range, 18 bytes a pixel for the filter. One instance a thread.
 class CensusMatcher {
  public:
   static constexpr int kReach = 3;  ///< columns and rows that a code takes in around its pixel [px]

@@ -20,8 +20,8 @@ namespace stereotrack {
 ///
 /// In: 1/16 px, kNoDisparity = none, at most the size of create(); `mask` of the same size or empty. Out: all
 /// wanted pixels are written, no others. Adds matched, speckle and filled to `counts`.
-/// O(pixels). Memory: 18 bytes a pixel. Faults at create(): kBadConfig (sides over 8192), kOutOfMemory. One instance a
-/// thread.
+/// O(pixels), most of it 64 pixels at a time (row_bits_kernel.hpp); speckles O(runs). Memory: 18 bytes a pixel. Faults
+/// at create(): kBadConfig (sides over 8192), kOutOfMemory. One instance a thread.
 class DisparityFilter {
  public:
   struct Config {
@@ -43,18 +43,32 @@ class DisparityFilter {
     std::int16_t y;
   };
 
-  [[nodiscard]] std::int64_t remove_speckles(ImageView<std::uint16_t> picture) noexcept;
-  [[nodiscard]] std::int64_t fill_gaps(ImageView<const std::uint8_t> mask,
-                                       ImageView<std::uint16_t> picture) const noexcept;
+  /// A row of find_runs().
+  struct Row {
+    std::uint64_t* with_left;   ///< [word] which pixels belong to the run of the left one
+    std::uint64_t* starts;      ///< [word] which pixels begin a run
+    std::int32_t* runs_before;  ///< [word] runs of the picture that begin before it
+  };
+
+  [[nodiscard]] std::uint64_t* known(int y) const noexcept { return known_.data() + std::ptrdiff_t{y} * words_; }
+
+  void remove_speckles(ImageView<std::uint16_t> picture, DisparityCounts& counts) noexcept;
+  void fill_gaps(ImageView<const std::uint8_t> mask, ImageView<std::uint16_t> picture,
+                 DisparityCounts& counts) const noexcept;
   [[nodiscard]] std::int32_t find_runs(ImageView<const std::uint16_t> picture) noexcept;
+  [[nodiscard]] std::int32_t run_length(Start start, int limit) const noexcept;
   [[nodiscard]] std::int32_t root(std::int32_t run) noexcept;
   void join(std::int32_t a, std::int32_t b) noexcept;
 
   Config config_;
   ImageView<std::uint16_t> work_;
-  std::span<std::uint16_t> none_row_;  ///< a row without disparities
+  std::span<std::uint16_t> none_row_;    ///< a row without disparities
+  int words_ = 0;                        ///< of a row of the running call
+  std::span<std::uint64_t> known_;       ///< [row][word] of which pixels have a disparity
+  std::span<std::uint64_t> alike_;       ///< [5][word] of find_runs()
+  std::span<std::int32_t> runs_before_;  ///< [2][word] likewise
+  std::span<std::uint64_t> wanted_;      ///< [word]
   // Islands are made of runs: neighbours in a row that belong together.
-  std::span<std::int32_t> run_of_;   ///< [row modulo 2][column]
   std::span<Start> starts_;          ///< [run]
   std::span<std::int32_t> lengths_;  ///< [run]
   std::span<std::int32_t> parents_;  ///< [run] union-find

@@ -1,6 +1,9 @@
 #include "pipeline/stereo/median_kernel.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <type_traits>
+#include <utility>
 
 #include "pipeline/stereo/disparity.hpp"
 
@@ -17,7 +20,7 @@ namespace stereotrack {
 
 namespace {
 
-[[maybe_unused]] std::uint16_t median_of_valid(const ImageView<const std::uint16_t>& in, int x, int y) noexcept {
+std::uint16_t median_of_valid(const ImageView<const std::uint16_t>& in, int x, int y) noexcept {
   if (in.at(x, y) == kNoDisparity) return kNoDisparity;
   std::uint16_t sorted[9];
   int count = 0;
@@ -53,33 +56,66 @@ void median_in_lanes(ImageView<const std::uint16_t> in, std::span<const std::uin
 #else
 
 /// Exchanges that sort nine values in seven layers.
-constexpr std::uint8_t kExchanges[25][2] = {{0, 3}, {1, 7}, {2, 5}, {4, 8}, {0, 7}, {2, 4}, {3, 8}, {5, 6}, {0, 2},
-                                            {1, 3}, {4, 5}, {7, 8}, {1, 4}, {3, 6}, {5, 7}, {0, 1}, {2, 4}, {3, 5},
-                                            {6, 8}, {2, 3}, {4, 5}, {6, 7}, {1, 2}, {3, 4}, {5, 6}};
+struct Exchange {
+  std::uint8_t low;
+  std::uint8_t high;
+};
+constexpr Exchange kExchanges[] = {{0, 3}, {1, 7}, {2, 5}, {4, 8}, {0, 7}, {2, 4}, {3, 8}, {5, 6}, {0, 2},
+                                   {1, 3}, {4, 5}, {7, 8}, {1, 4}, {3, 6}, {5, 7}, {0, 1}, {2, 4}, {3, 5},
+                                   {6, 8}, {2, 3}, {4, 5}, {6, 7}, {1, 2}, {3, 4}, {5, 6}};
+
+/// Indices are constants, so that all nine stay in registers and what nobody asks for is left out.
+template <std::size_t... kIndex>
+HWY_INLINE void sort(Vec (&v)[9], std::index_sequence<kIndex...> /*exchanges*/) {
+  const auto exchange = [&](auto index) HWY_ATTR {
+    constexpr Exchange kAt = kExchanges[index()];
+    const Vec smaller = hn::Min(v[kAt.low], v[kAt.high]);
+    v[kAt.high] = hn::Max(v[kAt.low], v[kAt.high]);
+    v[kAt.low] = smaller;
+  };
+  (exchange(std::integral_constant<std::size_t, kIndex>()), ...);
+}
 
 /// Of the pixels x.. of three rows.
 HWY_INLINE Vec median(const std::uint16_t* const (&rows)[3], int x) {
   const Lanes lanes;
   const Vec none = hn::Set(lanes, kNoDisparity);
   Vec v[9];
+  for (int j = 0; j < 3; ++j) {
+    v[3 * j] = hn::LoadU(lanes, rows[j] + x - 1);
+    v[3 * j + 1] = hn::LoadU(lanes, rows[j] + x);
+    v[3 * j + 2] = hn::LoadU(lanes, rows[j] + x + 1);
+  }
   Vec missing = hn::Zero(lanes);
-  for (int i = 0; i < 9; ++i) {
-    v[i] = hn::LoadU(lanes, rows[i / 3] + x + i % 3 - 1);
-    missing = hn::Sub(missing, hn::VecFromMask(lanes, hn::Eq(v[i], none)));
-  }
+  for (const Vec& value : v) missing = hn::Sub(missing, hn::VecFromMask(lanes, hn::Eq(value, none)));
   const auto centre_missing = hn::Eq(v[4], none);
-  for (const auto& [low, high] : kExchanges) {
-    const Vec smaller = hn::Min(v[low], v[high]);
-    v[high] = hn::Max(v[low], v[high]);
-    v[low] = smaller;
-  }
+  sort(v, std::make_index_sequence<std::size(kExchanges)>());
   // With n of nine missing the upper middle is the (9 - n) / 2-th.
-  Vec result = v[4];
-  for (int i = 3; i >= 0; --i) {
-    const Vec few = hn::Set(lanes, static_cast<std::uint16_t>(8 - 2 * i));
-    result = hn::IfThenElse(hn::Eq(hn::Max(missing, few), missing), v[i], result);
-  }
+  const auto many = [&](int n) HWY_ATTR {
+    return hn::Eq(hn::Max(missing, hn::Set(lanes, static_cast<std::uint16_t>(n))), missing);
+  };
+  Vec result = hn::IfThenElse(many(2), v[3], v[4]);
+  result = hn::IfThenElse(many(4), v[2], result);
+  result = hn::IfThenElse(many(6), v[1], result);
+  result = hn::IfThenElse(many(8), v[0], result);
   return hn::IfThenElse(centre_missing, none, result);
+}
+
+/// Pixels [x, x + count) where a vector would see beyond the row: it sees a copy with none around it.
+HWY_INLINE void median_of_copy(const std::uint16_t* const (&rows)[3], int width, int x, int count,
+                               std::uint16_t* result) {
+  constexpr int kCopied = kVector + 2;
+  std::uint16_t copies[3][kCopied];
+  const int from = std::max(x - 1, 0);
+  const int size = std::min(x + count + 1, width) - from;
+  const int skipped = from - (x - 1);
+  for (int j = 0; j < 3; ++j) {
+    std::fill_n(copies[j], kCopied, kNoDisparity);
+    std::copy_n(rows[j] + from, size, copies[j] + skipped);
+  }
+  HWY_ALIGN std::uint16_t found[kVector];
+  hn::Store(median({copies[0], copies[1], copies[2]}, 1), Lanes(), found);
+  std::copy_n(found, count, result + x);
 }
 
 void median_in_lanes(ImageView<const std::uint16_t> in, std::span<const std::uint16_t> none_row,
@@ -89,17 +125,13 @@ void median_in_lanes(ImageView<const std::uint16_t> in, std::span<const std::uin
     const std::uint16_t* const rows[3] = {y > 0 ? in.row(y - 1) : none_row.data(), in.row(y),
                                           y + 1 < in.height ? in.row(y + 1) : none_row.data()};
     std::uint16_t* result = out.row(y);
-    if (last < 1) {
-      for (int x = 0; x < in.width; ++x) result[x] = median_of_valid(in, x, y);
-      continue;
+    for (int x = 0; x < in.width; x += kVector) {
+      if (x == 0 || x > last) {
+        median_of_copy(rows, in.width, x, std::min(kVector, in.width - x), result);
+      } else {
+        hn::StoreU(median(rows, x), Lanes(), result + x);
+      }
     }
-    result[0] = median_of_valid(in, 0, y);
-    // Vectors must see both neighbours; the last one is moved back to do so.
-    for (int x = 1; x < in.width - 1; x += kVector) {
-      const int at = std::min(x, last);
-      hn::StoreU(median(rows, at), Lanes(), result + at);
-    }
-    result[in.width - 1] = median_of_valid(in, in.width - 1, y);
   }
 }
 

@@ -9,6 +9,7 @@
 #include "pipeline/core/simd.hpp"
 #include "pipeline/stereo/census_matcher.hpp"
 #include "pipeline/stereo/median_kernel.hpp"
+#include "pipeline/stereo/row_bits_kernel.hpp"
 #include "pipeline/stereo/sad_matcher.hpp"
 #include "tests/support/grid.hpp"
 
@@ -179,7 +180,7 @@ TEST_P(StereoSimd, CensusWithHardGatesEqualsTheReferenceBitForBit) {
 
 TEST_P(StereoSimd, MedianEqualsTheReferenceBitForBit) {
   ASSERT_TRUE(use_simd(GetParam()));
-  for (const int width : {1, 2, 3, 8, 9, 10, 16, 17, 18, 33, 34, 35, 100}) {
+  for (const int width : {1, 2, 3, 8, 9, 10, 16, 17, 18, 31, 32, 33, 34, 35, 65, 100}) {
     for (const int height : {1, 2, 3, 8}) {
       for (const int holes : {0, 30, 150, 256}) {
         Map in(width, height);
@@ -197,6 +198,41 @@ TEST_P(StereoSimd, MedianEqualsTheReferenceBitForBit) {
         median_lanes(std::as_const(in).view(), none, lanes.view());
         ASSERT_TRUE(plain == lanes) << width << 'x' << height << " holes " << holes;
       }
+    }
+  }
+}
+
+TEST_P(StereoSimd, RowBitsEqualTheReferenceBitForBit) {
+  ASSERT_TRUE(use_simd(GetParam()));
+  std::mt19937 random(3);
+  for (const int width : {0, 1, 2, 7, 8, 9, 31, 32, 33, 63, 64, 65, 66, 127, 128, 129, 200}) {
+    for (const int step : {0, 3, 40, 65535}) {
+      // Odd addresses, and values behind the row that must not count.
+      std::vector<std::uint16_t> row(static_cast<std::size_t>(width) + 100);
+      std::vector<std::uint16_t> above(row.size());
+      std::vector<std::uint8_t> mask(row.size());
+      for (std::size_t x = 0; x < row.size(); ++x) {
+        const auto value = [&] {
+          return random() % 4 == 0 ? kNoDisparity
+                                   : static_cast<std::uint16_t>(random() % 2 == 0 ? random() % 50 : 65534);
+        };
+        row[x] = value();
+        above[x] = value();
+        mask[x] = static_cast<std::uint8_t>(random() % 3 == 0 ? 0 : random());
+      }
+      const auto words = static_cast<std::size_t>(words_of(width));
+      const RowBitsTask task{row.data() + 1, above.data() + 1, width, step};
+      std::vector<std::uint64_t> plain[4];
+      std::vector<std::uint64_t> lanes[4];
+      for (int i = 0; i < 4; ++i) {
+        plain[i].assign(words, 1);
+        lanes[i].assign(words, 2);
+      }
+      row_bits_reference(task, {plain[0].data(), plain[1].data(), plain[2].data()});
+      row_bits(task, {lanes[0].data(), lanes[1].data(), lanes[2].data()});
+      wanted_bits_reference(mask.data() + 1, width, plain[3].data());
+      wanted_bits(mask.data() + 1, width, lanes[3].data());
+      for (int i = 0; i < 4; ++i) ASSERT_EQ(plain[i], lanes[i]) << width << " px, step " << step << ", bits " << i;
     }
   }
 }
