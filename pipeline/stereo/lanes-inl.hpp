@@ -90,11 +90,12 @@ HWY_INLINE hn::Vec<FourKeys> fold_blocks(D /*tag*/, hn::Vec<D> v) {
 }
 
 /// The smallest key of each of four vectors: halves of two vectors are put side by side and the smaller kept.
-HWY_INLINE hn::Vec<FourKeys> smallest_of_each(KeyVec a, KeyVec b, KeyVec c, KeyVec d) {
-  const Keys keys;
-  const hn::Repartition<std::uint64_t, Keys> pairs;
-  const KeyVec ab = hn::Min(hn::InterleaveLower(keys, a, b), hn::InterleaveUpper(keys, a, b));
-  const KeyVec cd = hn::Min(hn::InterleaveLower(keys, c, d), hn::InterleaveUpper(keys, c, d));
+template <class V>
+HWY_INLINE hn::Vec<FourKeys> smallest_of_each(V a, V b, V c, V d) {
+  const hn::DFromV<V> keys;
+  const hn::Repartition<std::uint64_t, hn::DFromV<V> > pairs;
+  const V ab = hn::Min(hn::InterleaveLower(keys, a, b), hn::InterleaveUpper(keys, a, b));
+  const V cd = hn::Min(hn::InterleaveLower(keys, c, d), hn::InterleaveUpper(keys, c, d));
   const auto ab_pairs = hn::BitCast(pairs, ab);
   const auto cd_pairs = hn::BitCast(pairs, cd);
   return fold_blocks(keys, hn::Min(hn::BitCast(keys, hn::InterleaveLower(pairs, ab_pairs, cd_pairs)),

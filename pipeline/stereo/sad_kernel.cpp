@@ -10,6 +10,18 @@
 
 #include "pipeline/stereo/lanes-inl.hpp"
 
+#ifndef STEREOTRACK_SAD_KERNEL_COMMON
+#define STEREOTRACK_SAD_KERNEL_COMMON
+namespace stereotrack {
+namespace {
+
+/// A window of 11 x 11 pixels sums up to 30,855: twice that and one fit 16 bits.
+[[maybe_unused]] constexpr int kLargestPairedBlock = 11;
+
+}  // namespace
+}  // namespace stereotrack
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace stereotrack {
 namespace HWY_NAMESPACE {
@@ -21,40 +33,118 @@ DisparityCounts match_in_lanes(const SadTask& task, SadScratch& scratch) { retur
 
 #else
 
-HWY_INLINE Vec distance(Vec a, Vec b) {
+/// As many bytes as there are lanes in one or two vectors.
+template <int kVectors>
+using Bytes = hn::CappedTag<std::uint8_t, static_cast<std::size_t>(kVectors >= 2 ? 2 * kVector : kVector)>;
+
+template <class D, class V>
+HWY_INLINE V distance(D /*tag*/, V a, V b) {
 #if HWY_ARCH_ARM
   return hn::Sub(hn::Max(a, b), hn::Min(a, b));  // one instruction there
 #else
-  const hn::RebindToSigned<Lanes> as_signed;
-  return hn::BitCast(Lanes(), hn::Abs(hn::BitCast(as_signed, hn::Sub(a, b))));
+  return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
 #endif
 }
 
-/// A row of greys as lanes.
-HWY_INLINE void widen(const std::uint8_t* HWY_RESTRICT in, int count, std::uint16_t* HWY_RESTRICT out) {
-  const hn::Rebind<std::uint8_t, Lanes> bytes;
-  int i = 0;
-  for (; i + kVector <= count; i += kVector) {
-    hn::StoreU(hn::PromoteTo(Lanes(), hn::LoadU(bytes, in + i)), Lanes(), out + i);
-  }
-  for (; i < count; ++i) out[i] = in[i];
+#if HWY_ARCH_X86
+// Products of unsigned and signed bytes, summed in pairs; Highway has no name for it yet.
+template <std::size_t N>
+HWY_INLINE auto weigh_pairs(hn::Vec128<std::uint8_t, N> v, hn::Vec128<std::int8_t, N> weights) {
+  return hn::Vec128<std::uint16_t, N / 2>{_mm_maddubs_epi16(v.raw, weights.raw)};
+}
+#if HWY_TARGET <= HWY_AVX2
+HWY_INLINE auto weigh_pairs(hn::Vec256<std::uint8_t> v, hn::Vec256<std::int8_t> weights) {
+  return hn::Vec256<std::uint16_t>{_mm256_maddubs_epi16(v.raw, weights.raw)};
+}
+HWY_INLINE auto quarters_in_pairs(hn::Vec256<std::uint8_t> v) {
+  return hn::Vec256<std::uint8_t>{_mm256_permute4x64_epi64(v.raw, _MM_SHUFFLE(3, 1, 2, 0))};
+}
+#endif
+#if HWY_TARGET <= HWY_AVX3
+HWY_INLINE auto weigh_pairs(hn::Vec512<std::uint8_t> v, hn::Vec512<std::int8_t> weights) {
+  return hn::Vec512<std::uint16_t>{_mm512_maddubs_epi16(v.raw, weights.raw)};
+}
+HWY_INLINE auto quarters_in_pairs(hn::Vec512<std::uint8_t> v) {
+  const __m512i order = _mm512_setr_epi64(0, 4, 1, 5, 2, 6, 3, 7);
+  return hn::Vec512<std::uint8_t>{_mm512_permutexvar_epi64(order, v.raw)};
+}
+#endif
+#endif
+
+/// Where sums of 16 bits stand in the vectors of a chunk. Bytes become two vectors of 16 bits block by block of 128
+/// bits, so that with longer vectors
+///   - two vectors get their bytes in such an order that lanes end up as counted,
+///   - of more, vectors 2i and 2i + 1 share lanes 2i kVector and following, block by block in turns.
+template <int kVectors>
+inline constexpr bool kInOrder = kVectors <= 2 || kVector <= 8;
+
+template <int kVectors, class V8>
+HWY_INLINE V8 ordered(V8 bytes) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+  if constexpr (kVectors == 2) return quarters_in_pairs(bytes);
+#endif
+  return bytes;
 }
 
-/// What is asked of a batch of pixels.
-enum class Batches {
-  kInner,   ///< every disparity's window is whole
-  kPadded,  ///< likewise, but some lanes are padding
-  kBorder,  ///< windows are clipped
+/// (entering - leaving), or twice that, as lanes of 16 bits modulo 2^16: one vector or two.
+template <int kVectors, bool kTwice, class V8>
+HWY_INLINE void subtract(V8 entering, V8 leaving, Vec* difference) {
+  const Lanes lanes;
+  if constexpr (kVectors == 1) {
+    const Vec once = hn::Sub(hn::PromoteTo(lanes, entering), hn::PromoteTo(lanes, leaving));
+    difference[0] = kTwice ? hn::Add(once, once) : once;
+  } else {
+#if HWY_ARCH_X86
+    const Bytes<kVectors> bytes;
+    const hn::Repartition<std::uint16_t, Bytes<kVectors> > pairs;
+    const hn::RebindToSigned<Bytes<kVectors> > as_signed;
+    const auto weights = hn::BitCast(as_signed, hn::Set(pairs, kTwice ? 0xFE02 : 0xFF01));
+    difference[0] = weigh_pairs(hn::InterleaveLower(bytes, entering, leaving), weights);
+    difference[1] = weigh_pairs(hn::InterleaveUpper(bytes, entering, leaving), weights);
+#else
+    static_assert(!kTwice);
+    const hn::Half<Bytes<kVectors> > half;
+    difference[0] = hn::Sub(hn::PromoteTo(lanes, hn::LowerHalf(half, entering)),
+                            hn::PromoteTo(lanes, hn::LowerHalf(half, leaving)));
+    difference[1] = hn::Sub(hn::PromoteTo(lanes, hn::UpperHalf(half, entering)),
+                            hn::PromoteTo(lanes, hn::UpperHalf(half, leaving)));
+#endif
+  }
+}
+
+/// A row of greys, each four times in 32 bits: what fills a vector of bytes fastest.
+HWY_INLINE void four_of_each(const std::uint8_t* HWY_RESTRICT in, int count, std::uint32_t* HWY_RESTRICT out) {
+  constexpr std::uint32_t kFour = 0x01010101;
+  const hn::Rebind<std::uint8_t, Keys> bytes;
+  constexpr int kStep = static_cast<int>(hn::MaxLanes(Keys()));
+  int i = 0;
+  for (; i + kStep <= count; i += kStep) {
+    hn::StoreU(hn::Mul(hn::PromoteTo(Keys(), hn::LoadU(bytes, in + i)), hn::Set(Keys(), kFour)), Keys(), out + i);
+  }
+  for (; i < count; ++i) out[i] = in[i] * kFour;
+}
+
+/// Which partners a pass meets.
+enum class Partners {
+  kAll,     ///< every lane has one
+  kPadded,  ///< every lane that is not padding
+  kSome,    ///< they are looked up
 };
 
+/// kPairs: sums are kept twice as large, and bit 0 says in which half of its chunk a lane stands: then the smaller of
+/// two lanes, one of each half, knows where it comes from. Where instructions for it are at hand and 16 bits hold it.
+template <bool kPairs>
 class SadLanes {
  public:
   SadLanes(const SadTask& task, SadScratch& scratch) noexcept
       : task_(task),
         s_(scratch),
         radius_(task.geometry.radius),
+        block_(2 * radius_ + 1),
         layout_(task.geometry, task.wanted.box),
         lanes_(layout_.lanes),
+        padding_(lanes_ - layout_.count),
+        smallest_(task.geometry.range.min - padding_),
         columns_(layout_.columns) {}
 
   [[nodiscard]] DisparityCounts run() noexcept {
@@ -62,101 +152,200 @@ class SadLanes {
     const int height = task_.left.height;
     const int first_row = std::max(box.top - radius_, 0);
     std::fill_n(s_.column_sums.data(), std::ptrdiff_t{columns_ + 1} * lanes_, std::uint16_t{0});
-    std::fill_n(s_.partner_exists.data(), layout_.partners, std::uint16_t{0});
+    std::fill_n(s_.distances.data(), std::ptrdiff_t{block_} * columns_ * lanes_, std::uint8_t{0});
+    std::fill_n(s_.partner_exists.data(), layout_.partners, std::uint8_t{0});
     std::fill_n(s_.partner_exists.data() + layout_.first_partner, layout_.end_partner - layout_.first_partner,
-                std::uint16_t{0xFFFF});
-    for (int i = 0; i < columns_; ++i) {
-      s_.limits[static_cast<std::size_t>(i)] = WindowLimits(task_.geometry, layout_.first_column + i);
+                std::uint8_t{0xFF});
+    std::fill_n(s_.right_greys.data(), layout_.partners, std::uint8_t{0});
+    for (int x = box.left; x < box.right(); ++x) {
+      const auto i = static_cast<std::size_t>(x - layout_.first_column);
+      s_.limits[i] = WindowLimits(task_.geometry, x);
+      rank(x, s_.limits[i]);
     }
-    clear(s_.left_leaves, s_.right_leaves);
-    clear(s_.left_enters, s_.right_enters);
     for (int y = first_row; y < std::min(box.top + radius_, height); ++y) {
-      read_row(y, s_.left_enters, s_.right_enters);
+      read_row(y);
       for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { change_columns<vectors()>(lane, 0, columns_); });
     }
     for (int y = box.top; y < box.bottom(); ++y) {
-      // Outside the picture, greys of 0 in both rows change no sum.
-      if (y + radius_ < height) {
-        read_row(y + radius_, s_.left_enters, s_.right_enters);
-      } else {
-        clear(s_.left_enters, s_.right_enters);
-      }
-      if (y - radius_ - 1 >= first_row) read_row(y - radius_ - 1, s_.left_leaves, s_.right_leaves);
+      read_row(y + radius_);
       match_row(y);
     }
     return counts_;
   }
 
  private:
-  void clear(std::span<std::uint16_t> left, std::span<std::uint16_t> right) const noexcept {
-    std::fill_n(left.data(), columns_, std::uint16_t{0});
-    std::fill_n(right.data(), layout_.partners, std::uint16_t{0});
+  /// RankedKeys of a column, where it can have them; such columns stand side by side.
+  void rank(int x, const WindowLimits& limits) noexcept {
+    const int clipped = limits.end - limits.end_whole;
+    if (block_ > RankedKeys::kLargestBlock || limits.first != limits.first_whole ||
+        limits.first_whole == limits.end_whole || clipped >= RankedKeys::kRanks) {
+      return;
+    }
+    if (ranked_end_ != x) ranked_begin_ = x;
+    ranked_end_ = x + 1;
+    const auto i = static_cast<std::size_t>(x - layout_.first_column);
+    const BlockGeometry& g = task_.geometry;
+    RankedKeys& ranked = s_.ranked[i];
+    ranked.lane = layout_.count - limits.end;
+    for (int slot = 0; slot < RankedKeys::kRanks; ++slot) {
+      const bool exists = slot < clipped;
+      ranked.weights[slot] = exists ? RankedKeys::weight(g.columns(x, g.range.min + limits.end - 1 - slot)) : 0;
+      ranked.ranks[slot] = exists ? static_cast<std::uint32_t>(clipped - slot) : ~0U;
+    }
+    s_.whole_weights[i] = RankedKeys::weight(g.columns(x));
+    s_.rank_zero[i] = static_cast<std::uint32_t>(limits.end_whole - 1 + padding_);
   }
 
-  void read_row(int y, std::span<std::uint16_t> left, std::span<std::uint16_t> right) const noexcept {
-    widen(task_.left.row(y) + layout_.first_column, columns_, left.data());
-    const std::ptrdiff_t partner = layout_.partner + layout_.first_partner;
-    widen(task_.right.row(y) + partner, layout_.end_partner - layout_.first_partner,
-          right.data() + layout_.first_partner);
+  /// Sums of a chunk as keys carry the bit that is taken out here: (2 sum + upper) << 16 | id becomes
+  /// 2 sum << 16 | id + upper * half a chunk, so that keys of several chunks are comparable.
+  template <int kVectors, class D>
+  static HWY_INLINE hn::Vec<D> comparable(D keys, hn::Vec<D> v) {
+    if constexpr (kPairs && kVectors >= 2) {
+      constexpr int kHalf = kVectors / 2 * kVector;
+      static_assert(kHalf == kLaneStep || 2 * kHalf == kLaneStep);
+      const auto upper = hn::And(v, hn::Set(keys, 0x10000U));
+      return hn::Add(hn::Sub(v, upper), hn::ShiftRight < kHalf == kLaneStep ? 11 : 12 > (upper));
+    } else {
+      return v;
+    }
+  }
+
+  /// Of a comparable key.
+  [[nodiscard]] static std::uint32_t sum_of(std::uint32_t key) { return key >> (kPairs ? 17 : 16); }
+
+  /// What the passes over a chunk of lanes know.
+  template <int kVectors>
+  struct Chunk {
+    Vec ids[kVectors];                             ///< d - range.min + padding, so that those of padding come first
+    Vec marks[kVectors];                           ///< what a window's sum starts with
+    hn::Vec<Bytes<kVectors> > partners[kVectors];  ///< 0 for padding; every second is used, where bytes take two
+
+    HWY_INLINE Chunk(const LaneLayout& layout, int lane) {
+      const Lanes lanes;
+      const Bytes<kVectors> bytes;
+      constexpr int kStep = static_cast<int>(hn::MaxLanes(Bytes<kVectors>())) / kVector;
+      const Vec iota = hn::Iota(lanes, std::uint16_t{0});
+      for (int k = 0; k < kVectors; ++k) {
+        const Vec at = kInOrder<kVectors>
+                           ? hn::Add(iota, hn::Set(lanes, static_cast<std::uint16_t>(k * kVector)))
+                           : hn::Add(hn::Add(iota, hn::And(iota, hn::Set(lanes, 8))),
+                                     hn::Set(lanes, static_cast<std::uint16_t>(k / 2 * 2 * kVector + k % 2 * 8)));
+        ids[k] = hn::Sub(hn::Set(lanes, static_cast<std::uint16_t>(layout.lanes - 1 - lane)), at);
+        const bool upper = kPairs && k < kVectors / 2;
+        marks[k] = hn::Or(outside(ids[k], layout.lanes - layout.count, layout.count),
+                          hn::Set(lanes, static_cast<std::uint16_t>(upper ? 1 : 0)));
+      }
+      for (int k = 0; k < kVectors; k += kStep) {
+        const auto true_ones = static_cast<std::uint8_t>(std::clamp(layout.count - lane - k * kVector, 0, 255));
+        partners[k] = hn::VecFromMask(bytes, hn::Lt(hn::Iota(bytes, std::uint8_t{0}), hn::Set(bytes, true_ones)));
+      }
+    }
+  };
+
+  /// The greys of the row that enters the window; outside the picture, equal ones that change no sum. Its distances
+  /// take the place of those of the row that leaves.
+  void read_row(int y) noexcept {
+    slot_ = slot_ + 1 == block_ ? 0 : slot_ + 1;
+    const int existing = layout_.end_partner - layout_.first_partner;
+    std::uint8_t* right = s_.right_greys.data() + layout_.first_partner;
+    if (y < task_.left.height) {
+      four_of_each(task_.left.row(y) + layout_.first_column, columns_, s_.left_greys.data());
+      std::copy_n(task_.right.row(y) + layout_.partner + layout_.first_partner, existing, right);
+    } else {
+      std::fill_n(s_.left_greys.data(), columns_, 0U);
+      std::fill_n(right, existing, std::uint8_t{0});
+    }
   }
 
   /// Where a column and its partners stand. A copy by value: what lies behind pointers of pointers would be read again
   /// after each store.
   struct Column {
-    const std::uint16_t* left_enters;
-    const std::uint16_t* left_leaves;
-    const std::uint16_t* right_enters;
-    const std::uint16_t* right_leaves;
-    const std::uint16_t* partner_exists;
+    const std::uint32_t* left;
+    const std::uint8_t* right;
+    const std::uint8_t* exists;
+    std::uint8_t* distances;
     std::uint16_t* sums;
     std::ptrdiff_t stride;
 
     HWY_INLINE void advance() {
-      ++left_enters, ++left_leaves, ++right_enters, ++right_leaves, ++partner_exists;
-      sums += stride;
+      ++left, ++right, ++exists;
+      distances += stride, sums += stride;
     }
   };
 
   [[nodiscard]] HWY_INLINE Column column(int i, int lane) const {
     const std::ptrdiff_t at = std::ptrdiff_t{i} + lane;
-    return {s_.left_enters.data() + i,
-            s_.left_leaves.data() + i,
-            s_.right_enters.data() + at,
-            s_.right_leaves.data() + at,
+    return {s_.left_greys.data() + i,
+            s_.right_greys.data() + at,
             s_.partner_exists.data() + at,
+            s_.distances.data() + (std::ptrdiff_t{slot_} * columns_ + i) * lanes_ + lane,
             s_.column_sums.data() + std::ptrdiff_t{i + 1} * lanes_ + lane,
             lanes_};
   }
 
   /// Brings a column's sums to the new row and adds them to the window's.
-  template <int kVectors, bool kBorder>
-  static HWY_INLINE void enter(const Column& column, Vec* window) {
+  template <int kVectors, Partners kPartners>
+  static HWY_INLINE void enter(const Column& at, const Chunk<kVectors>& chunk, Vec* window) {
     const Lanes lanes;
-    const Vec grey_enters = hn::Set(lanes, *column.left_enters);
-    const Vec grey_leaves = hn::Set(lanes, *column.left_leaves);
-    for (int k = 0; k < kVectors; ++k) {
-      Vec change = hn::Sub(distance(grey_enters, hn::LoadU(lanes, column.right_enters + k * kVector)),
-                           distance(grey_leaves, hn::LoadU(lanes, column.right_leaves + k * kVector)));
-      if constexpr (kBorder) change = hn::And(change, hn::LoadU(lanes, column.partner_exists + k * kVector));
-      const Vec sum = hn::Add(hn::Load(lanes, column.sums + k * kVector), change);
-      hn::Store(sum, lanes, column.sums + k * kVector);
-      window[k] = hn::Add(window[k], sum);
+    const Bytes<kVectors> bytes;
+    constexpr int kStep = static_cast<int>(hn::MaxLanes(Bytes<kVectors>())) / kVector;
+    const hn::Repartition<std::uint32_t, Bytes<kVectors> > fours;
+    const auto left = hn::BitCast(bytes, hn::Set(fours, *at.left));
+    for (int k = 0; k < kVectors; k += kStep) {
+      auto entering = distance(bytes, left, hn::LoadU(bytes, at.right + k * kVector));
+      if constexpr (kPartners == Partners::kSome)
+        entering = hn::And(entering, hn::LoadU(bytes, at.exists + k * kVector));
+      if constexpr (kPartners != Partners::kAll) entering = hn::And(entering, chunk.partners[k]);
+      entering = ordered<kVectors>(entering);
+      std::uint8_t* kept = at.distances + k * kVector;
+      Vec change[2];
+      subtract<kVectors, kPairs>(entering, hn::LoadU(bytes, kept), change);
+      hn::StoreU(entering, bytes, kept);
+      for (int i = 0; i < kStep; ++i) {
+        std::uint16_t* sums = at.sums + (k + i) * kVector;
+        const Vec sum = hn::Add(hn::Load(lanes, sums), change[i]);
+        hn::Store(sum, lanes, sums);
+        window[k + i] = hn::Add(window[k + i], sum);
+      }
     }
+  }
+
+  template <int kVectors>
+  static HWY_INLINE void leave(const std::uint16_t* gone, Vec* window) {
+    for (int k = 0; k < kVectors; ++k) window[k] = hn::Sub(window[k], hn::Load(Lanes(), gone + k * kVector));
+  }
+
+  /// The smaller keys of each lane pair; not yet comparable.
+  template <int kVectors>
+  static HWY_INLINE KeyVec best_keys(const Chunk<kVectors>& chunk, const Vec* sums) {
+    constexpr bool kHalves = kPairs && kVectors >= 2;
+    constexpr int kFirst = kHalves ? kVectors / 2 : 0;
+    const auto smaller = [&](int k) HWY_ATTR {
+      if constexpr (kHalves) return hn::Min(sums[k - kFirst], sums[k]);
+      return sums[k];
+    };
+    Vec smallest = smaller(kVectors - 1);
+    Vec id = chunk.ids[kVectors - 1];
+    for (int k = kVectors - 2; k >= kFirst; --k) keep_smaller(smallest, id, smaller(k), chunk.ids[k]);
+    return keys_of(smallest, id);
   }
 
   /// Columns [begin, end) of the region.
   template <int kVectors>
   HWY_INLINE void change_columns(int lane, int begin, int end) const {
+    if (begin >= end) return;
+    const Chunk<kVectors> chunk(layout_, lane);
     Vec unused[kVectors];
     for (int k = 0; k < kVectors; ++k) unused[k] = hn::Zero(Lanes());
     Column at = column(begin, lane);
-    for (int i = begin; i < end; ++i, at.advance()) enter<kVectors, true>(at, unused);
+    for (int i = begin; i < end; ++i, at.advance()) enter<kVectors, Partners::kSome>(at, chunk, unused);
   }
 
   /// The window just left of the row's first pixel, and all columns that the row's windows do not reach.
   template <int kVectors>
   HWY_INLINE void start_row(int lane, Span span) const {
     const Lanes lanes;
+    const Chunk<kVectors> chunk(layout_, lane);
     const int begin = std::max(span.first - radius_, 0) - layout_.first_column;
     const int middle = std::min(span.first + radius_ - layout_.first_column, columns_);
     const int end = std::min(span.last + radius_ + 1 - layout_.first_column, columns_);
@@ -164,26 +353,63 @@ class SadLanes {
     // The column before the first is what the first pixel's window loses; before the region's first stand zeros.
     const std::uint16_t* before = s_.column_sums.data() + std::ptrdiff_t{begin} * lanes_ + lane;
     Vec window[kVectors];
-    for (int k = 0; k < kVectors; ++k) window[k] = hn::Load(lanes, before + k * kVector);
+    for (int k = 0; k < kVectors; ++k) window[k] = hn::Or(hn::Load(lanes, before + k * kVector), chunk.marks[k]);
     Column at = column(begin, lane);
-    for (int i = begin; i < middle; ++i, at.advance()) enter<kVectors, true>(at, window);
+    for (int i = begin; i < middle; ++i, at.advance()) enter<kVectors, Partners::kSome>(at, chunk, window);
     for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
     change_columns<kVectors>(lane, end, columns_);
   }
 
-  /// Moves the window over `size` pixels from x on and offers each lane's sum.
-  template <int kVectors, Batches kBatches, bool kFirst>
+  /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole.
+  template <int kVectors, Partners kPartners, bool kFirst>
   HWY_INLINE void slide(int lane, int x, int size, BatchBest& best) const {
-    constexpr bool kBorder = kBatches == Batches::kBorder;
     const Lanes lanes;
+    const Chunk<kVectors> chunk(layout_, lane);
     Vec window[kVectors];
-    Vec ids[kVectors];
-    Vec padding[kVectors];
-    disparities_of<kVectors>(layout_.count, lane, ids);
-    for (int k = 0; k < kVectors; ++k) {
-      window[k] = hn::Load(lanes, s_.window_sums.data() + lane + k * kVector);
-      if constexpr (kBatches == Batches::kPadded) padding[k] = outside(ids[k], 0, layout_.count);
+    for (int k = 0; k < kVectors; ++k) window[k] = hn::Load(lanes, s_.window_sums.data() + lane + k * kVector);
+    Column entering = column(x + radius_ - layout_.first_column, lane);
+    const std::uint16_t* gone =
+        s_.column_sums.data() + std::ptrdiff_t{x - radius_ - layout_.first_column} * lanes_ + lane;
+    const std::ptrdiff_t stride = lanes_;
+    for (int j = 0; j < size; j += 4) {
+      KeyVec keys[4];
+      for (int i = 0; i < 4; ++i, entering.advance(), gone += stride) {
+        enter<kVectors, kPartners>(entering, chunk, window);
+        leave<kVectors>(gone, window);
+        keys[i] = best_keys<kVectors>(chunk, window);
+      }
+      const FourKeys four;
+      auto found = comparable<kVectors>(four, smallest_of_each(keys[0], keys[1], keys[2], keys[3]));
+      if constexpr (!kFirst) found = hn::Min(found, hn::Load(four, best.keys + j));
+      hn::Store(found, four, best.keys + j);
     }
+    for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
+  }
+
+  /// Sums of a chunk, lanes in their order.
+  template <int kVectors>
+  static HWY_INLINE void store_in_order(const Vec* sums, std::uint16_t* to) {
+    const Lanes lanes;
+    for (int k = 0; k < kVectors; ++k) {
+      if constexpr (kInOrder<kVectors>) {
+        hn::Store(sums[k], lanes, to + k * kVector);
+      } else {
+        const hn::Half<Lanes> half;
+        static_assert(kVectors * 16 == 2 * kLaneStep);
+        std::uint16_t* at = to + k / 2 * 2 * kVector + k % 2 * 8;
+        hn::Store(hn::LowerHalf(half, sums[k]), half, at);
+        hn::Store(hn::UpperHalf(half, sums[k]), half, at + 16);
+      }
+    }
+  }
+
+  /// The same where windows may be clipped: all sums are kept, and only whole windows are offered.
+  template <int kVectors, bool kFirst>
+  HWY_INLINE void slide_clipped(int lane, int x, int size, BatchBest& best) const {
+    const Lanes lanes;
+    const Chunk<kVectors> chunk(layout_, lane);
+    Vec window[kVectors];
+    for (int k = 0; k < kVectors; ++k) window[k] = hn::Load(lanes, s_.window_sums.data() + lane + k * kVector);
     Column entering = column(x + radius_ - layout_.first_column, lane);
     const std::uint16_t* gone =
         s_.column_sums.data() + std::ptrdiff_t{x - radius_ - layout_.first_column} * lanes_ + lane;
@@ -192,59 +418,100 @@ class SadLanes {
     const int first_leaving = layout_.first_column + radius_;
     const WindowLimits* limits = s_.limits.data() + (x - layout_.first_column);
     std::uint16_t* kept = s_.batch_sums.data() + lane;
-    for (int j = 0; j < size; ++j, entering.advance(), gone += stride) {
-      if (!kBorder || x + j <= last_entering) enter<kVectors, kBorder>(entering, window);
-      if (!kBorder || x + j >= first_leaving) {
-        for (int k = 0; k < kVectors; ++k) window[k] = hn::Sub(window[k], hn::Load(lanes, gone + k * kVector));
+    for (int j = 0; j < size; ++j, entering.advance(), gone += stride, kept += stride) {
+      if (x + j <= last_entering) enter<kVectors, Partners::kSome>(entering, chunk, window);
+      if (x + j >= first_leaving) leave<kVectors>(gone, window);
+      store_in_order<kVectors>(window, kept);
+      Vec whole[kVectors];
+      for (int k = 0; k < kVectors; ++k) {
+        const int whole_windows = limits[j].end_whole - limits[j].first_whole;
+        whole[k] = hn::Or(window[k], outside(chunk.ids[k], limits[j].first_whole + padding_, whole_windows));
       }
-      const auto sums = [&](int k) HWY_ATTR {
-        if constexpr (kBorder)
-          return hn::Or(window[k], outside(ids[k], limits[j].first_whole, limits[j].end_whole - limits[j].first_whole));
-        if constexpr (kBatches == Batches::kPadded) return hn::Or(window[k], padding[k]);
-        return window[k];
-      };
-      Vec smallest = sums(kVectors - 1);
-      Vec id = ids[kVectors - 1];
-      for (int k = kVectors - 2; k >= 0; --k) keep_smaller(smallest, id, sums(k), ids[k]);
-      best.offer<kFirst>(j, keys_of(smallest, id));
-      if constexpr (kBorder) {
-        for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, kept + k * kVector);
-        kept += stride;
-      }
+      best.offer<kFirst>(j, comparable<kVectors>(Keys(), best_keys<kVectors>(chunk, whole)));
     }
     for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
   }
 
-  template <Batches kBatches>
-  void slide_all(int x, int size, BatchBest& best) const noexcept {
+  void match_inner(int x, int size) noexcept {
+    BatchBest& best = best_;
+    const bool padded = layout_.count != lanes_;
     for_each_chunk(lanes_, [&](auto vectors, int lane, bool first) {
-      if (first) {
-        slide<vectors(), kBatches, true>(lane, x, size, best);
+      if (!first) {
+        slide<vectors(), Partners::kAll, false>(lane, x, size, best);
+      } else if (padded) {
+        slide<vectors(), Partners::kPadded, true>(lane, x, size, best);
       } else {
-        slide<vectors(), kBatches == Batches::kPadded ? Batches::kInner : kBatches, false>(lane, x, size, best);
+        slide<vectors(), Partners::kAll, true>(lane, x, size, best);
       }
     });
   }
 
-  /// The best candidate of pixel x, the j-th of its batch, of those with whole windows and those without.
-  [[nodiscard]] HWY_INLINE int with_clipped(int x, int j, const BatchBest& best) const {
+  void match_clipped(int x, int size) noexcept {
+    BatchBest& best = best_;
+    for_each_chunk(lanes_, [&](auto vectors, int lane, bool first) {
+      if (first) {
+        slide_clipped<vectors(), true>(lane, x, size, best);
+      } else {
+        slide_clipped<vectors(), false>(lane, x, size, best);
+      }
+    });
+    best.find(size);
+    for (int j = 0; j < size;) {
+      if (j + 4 <= size && x + j >= ranked_begin_ && x + j + 4 <= ranked_end_) {
+        choose_four(x + j, j);
+        j += 4;
+      } else {
+        best.keys[j] = choose(x + j, j);
+        nones_ += best.keys[j] == kNoId ? 1 : 0;
+        ++j;
+      }
+    }
+  }
+
+  /// The best candidates of pixels x..x+3, the j-th and following of their batch, of those with whole windows and those
+  /// without, where all four have RankedKeys.
+  HWY_INLINE void choose_four(int x, int j) noexcept {
+    const FourKeys four;
+    const hn::Rebind<std::uint16_t, FourKeys> narrow;
+    constexpr int kShift = kPairs ? 1 : 0;
+    const std::size_t i = static_cast<std::size_t>(x - layout_.first_column);
+    const RankedKeys* ranked = &s_.ranked[i];
+    const auto clipped = [&](int pixel) HWY_ATTR {
+      const RankedKeys& r = ranked[pixel];
+      const std::uint16_t* sums = s_.batch_sums.data() + std::ptrdiff_t{j + pixel} * lanes_ + r.lane;
+      const auto keys = [&](int slot) HWY_ATTR {
+        const auto sum = hn::ShiftRight<kShift>(hn::PromoteTo(four, hn::LoadU(narrow, sums + slot)));
+        return hn::Add(hn::Mul(sum, hn::Load(four, r.weights + slot)), hn::Load(four, r.ranks + slot));
+      };
+      return radius_ <= 4 ? keys(0) : hn::Min(keys(0), keys(4));
+    };
+    const auto whole = hn::LoadU(four, best_.keys + j);
+    const auto whole_id = hn::And(whole, hn::Set(four, 0xFFFFU));
+    const auto whole_key = hn::Mul(hn::ShiftRight<16 + kShift>(whole), hn::LoadU(four, s_.whole_weights.data() + i));
+    const auto best = hn::Min(whole_key, smallest_of_each(clipped(0), clipped(1), clipped(2), clipped(3)));
+    const auto rank = hn::And(best, hn::Set(four, RankedKeys::kRanks - 1U));
+    const auto clipped_id = hn::Add(rank, hn::LoadU(four, s_.rank_zero.data() + i));
+    hn::StoreU(hn::IfThenElse(hn::Eq(rank, hn::Zero(four)), whole_id, clipped_id), four, best_.keys + j);
+  }
+
+  /// The best candidate of pixel x, the j-th of its batch, likewise; any limits, and exact fractions.
+  [[nodiscard]] std::uint32_t choose(int x, int j) const noexcept {
     const BlockGeometry& g = task_.geometry;
     const WindowLimits limits = s_.limits[static_cast<std::size_t>(x - layout_.first_column)];
     const std::uint16_t* sums = s_.batch_sums.data() + std::ptrdiff_t{j} * lanes_ + (layout_.count - 1);
     SadCandidate winner;
-    // Rising disparities, so that of equals the smallest stays. No branches: which wins cannot be foretold.
-    const auto offer = [&](int id, std::uint32_t sum, int columns) HWY_ATTR {
+    const auto offer = [&](int id, std::uint32_t sum, int columns) {
       const SadCandidate candidate{id, sum, static_cast<std::uint32_t>(columns)};
-      const std::uint32_t takes = 0U - static_cast<std::uint32_t>(candidate.better_than(winner));
-      winner.disparity ^= (winner.disparity ^ id) & static_cast<int>(takes);
-      winner.sum ^= (winner.sum ^ sum) & takes;
-      winner.columns ^= (winner.columns ^ candidate.columns) & takes;
+      if (candidate.better_than(winner)) winner = candidate;
     };
-    const int d = g.range.min;
-    for (int id = limits.first; id < limits.first_whole; ++id) offer(id, sums[-id], g.columns(x, d + id));
-    if (limits.first_whole < limits.end_whole) offer(best.id(j), best.value(j), g.columns(x));
-    for (int id = limits.end_whole; id < limits.end; ++id) offer(id, sums[-id], g.columns(x, d + id));
-    return winner.disparity < 0 ? -1 : g.range.min + winner.disparity;
+    const auto offer_clipped = [&](int id) {
+      offer(id, std::uint32_t{sums[-id]} >> (kPairs ? 1 : 0), g.columns(x, g.range.min + id));
+    };
+    // Rising disparities, so that of equals the smallest stays.
+    for (int id = limits.first; id < limits.first_whole; ++id) offer_clipped(id);
+    if (limits.first_whole < limits.end_whole) offer(best_.id(j) - padding_, sum_of(best_.keys[j]), g.columns(x));
+    for (int id = limits.end_whole; id < limits.end; ++id) offer_clipped(id);
+    return winner.disparity < 0 ? kNoId : static_cast<std::uint32_t>(winner.disparity + padding_);
   }
 
   void match_row(int y) noexcept {
@@ -254,52 +521,100 @@ class SadLanes {
       return;
     }
     for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { start_row<vectors()>(lane, span); });
-    std::uint16_t* out = task_.out.row(y);
-    BatchBest& best = best_;
     for (int x = span.first; x <= span.last;) {
-      const int size = layout_.batch(x, span.last);
-      const bool inner = layout_.is_inner(x);
-      if (!inner) {
-        slide_all<Batches::kBorder>(x, size, best);
-      } else if (layout_.count != lanes_) {
-        slide_all<Batches::kPadded>(x, size, best);
+      // What is left of the fours goes the way of the clipped.
+      int size = layout_.batch(x, span.last);
+      nones_ = 0;
+      const bool inner = layout_.is_inner(x) && size >= 4;
+      if (inner) {
+        size = size / 4 * 4;
+        match_inner(x, size);
       } else {
-        slide_all<Batches::kInner>(x, size, best);
+        match_clipped(x, size);
       }
-      best.find(size);
-      if (inner && task_.mask.empty()) {
-        best.disparities(task_.geometry.range.min, size, out + x);
-        counts_.wanted += size;
-        counts_.matched += size;
+      if (task_.mask.empty()) {
+        write_all(x, y, size);
       } else {
-        write(x, y, size, inner, best);
+        write(x, y, size);
       }
       x += size;
     }
   }
 
-  void write(int x, int y, int size, bool inner, const BatchBest& best) noexcept {
-    std::uint16_t* out = task_.out.row(y);
-    for (int j = 0; j < size; ++j) {
-      if (!is_wanted(task_.mask, x + j, y)) continue;
-      const int d = inner ? task_.geometry.range.min + best.id(j) : with_clipped(x + j, j, best);
-      ++counts_.wanted;
-      ++(d < 0 ? counts_.border : counts_.matched);
-      out[x + j] = d < 0 ? kNoDisparity : static_cast<std::uint16_t>(d * kDisparityScale);
+  /// Of the batch's pixels those that are wanted.
+  void write(int x, int y, int size) noexcept {
+    const std::uint8_t* mask = task_.mask.row(y) + x;
+    std::uint16_t* out = task_.out.row(y) + x;
+    const FourKeys four;
+    const hn::Rebind<std::int32_t, FourKeys> as_signed;
+    const hn::Rebind<std::uint16_t, FourKeys> narrow;
+    const hn::Rebind<std::uint8_t, FourKeys> bytes;
+    const auto no_id = hn::Set(four, kNoId);
+    const auto smallest = hn::Set(four, static_cast<std::uint32_t>(smallest_));
+    std::size_t wanted = 0;
+    std::size_t border = 0;
+    int j = 0;
+    for (; j + 4 <= size; j += 4) {
+      const auto asked = hn::LoadU(bytes, mask + j);
+      const auto id = hn::And(hn::Load(four, best_.keys + j), no_id);
+      const auto none = hn::Eq(id, no_id);
+      const auto values = hn::IfThenElse(none, hn::Set(four, kNoDisparity), hn::ShiftLeft<4>(hn::Add(id, smallest)));
+      const auto is_asked = hn::Ne(hn::PromoteTo(narrow, asked), hn::Zero(narrow));
+      hn::StoreU(
+          hn::IfThenElse(is_asked, hn::DemoteTo(narrow, hn::BitCast(as_signed, values)), hn::LoadU(narrow, out + j)),
+          narrow, out + j);
+      const auto counted = hn::Ne(hn::PromoteTo(four, asked), hn::Zero(four));
+      wanted += hn::CountTrue(four, counted);
+      border += hn::CountTrue(four, hn::And(counted, none));
     }
+    for (; j < size; ++j) {
+      if (mask[j] == 0) continue;
+      const bool none = best_.id(j) == kNoId;
+      ++wanted;
+      border += none ? 1 : 0;
+      out[j] = none ? kNoDisparity : static_cast<std::uint16_t>((smallest_ + best_.id(j)) * kDisparityScale);
+    }
+    counts_.wanted += static_cast<std::int64_t>(wanted);
+    counts_.border += static_cast<std::int64_t>(border);
+    counts_.matched += static_cast<std::int64_t>(wanted - border);
   }
+
+  /// The same where all are wanted.
+  void write_all(int x, int y, int size) noexcept {
+    std::uint16_t* out = task_.out.row(y) + x;
+    best_.disparities(smallest_, size, out);
+    counts_.wanted += size;
+    counts_.matched += size - nones_;
+    counts_.border += nones_;
+    if (nones_ == 0) return;
+    for (int j = 0; j < size; ++j) out[j] = best_.id(j) == kNoId ? kNoDisparity : out[j];
+  }
+
+  static constexpr std::uint32_t kNoId = 0xFFFF;
 
   const SadTask& task_;
   SadScratch& s_;
   int radius_;
+  int block_;
   LaneLayout layout_;
   int lanes_;
+  int padding_;   ///< of lanes_
+  int smallest_;  ///< disparity of id 0, maybe of padding [px]
   int columns_;
-  BatchBest best_{};
+  int slot_ = -1;         ///< of distances, of the row that enters
+  int ranked_begin_ = 0;  ///< pixels [begin, end) have RankedKeys
+  int ranked_end_ = -1;
+  int nones_ = 0;   ///< pixels of the batch without a candidate
+  BatchBest best_;  ///< the batch's winners, ids as of Chunk; kNoId where there is no candidate
   DisparityCounts counts_;
 };
 
-DisparityCounts match_in_lanes(const SadTask& task, SadScratch& scratch) { return SadLanes(task, scratch).run(); }
+DisparityCounts match_in_lanes(const SadTask& task, SadScratch& scratch) {
+#if HWY_ARCH_X86
+  if (2 * task.geometry.radius + 1 <= kLargestPairedBlock) return SadLanes<true>(task, scratch).run();
+#endif
+  return SadLanes<false>(task, scratch).run();
+}
 
 #endif
 
@@ -313,20 +628,22 @@ namespace stereotrack {
 
 HWY_EXPORT(match_in_lanes);
 
-SadScratch SadScratch::create(int width, int disparities, Arena& arena) noexcept {
+SadScratch SadScratch::create(int width, int block, int disparities, Arena& arena) noexcept {
   const auto columns = static_cast<std::size_t>(width);
   const auto lanes = static_cast<std::size_t>(padded_lanes(disparities));
   SadScratch s;
+  s.distances = arena.array<std::uint8_t>(static_cast<std::size_t>(block) * columns * lanes);
   s.column_sums = arena.array<std::uint16_t>((columns + 1) * lanes);
   s.window_sums = arena.array<std::uint16_t>(lanes);
-  s.batch_sums = arena.array<std::uint16_t>(lanes * kPixelStep);
+  s.batch_sums = arena.array<std::uint16_t>(lanes * kPixelStep + kLaneStep);  // read in vectors
   s.reference_sums = arena.array<std::uint32_t>(lanes);
   s.limits = arena.array<WindowLimits>(columns);
-  s.left_enters = arena.array<std::uint16_t>(columns);
-  s.left_leaves = arena.array<std::uint16_t>(columns);
-  s.right_enters = arena.array<std::uint16_t>(columns + lanes);
-  s.right_leaves = arena.array<std::uint16_t>(columns + lanes);
-  s.partner_exists = arena.array<std::uint16_t>(columns + lanes);
+  s.ranked = arena.array<RankedKeys>(columns);
+  s.whole_weights = arena.array<std::uint32_t>(columns);
+  s.rank_zero = arena.array<std::uint32_t>(columns);
+  s.left_greys = arena.array<std::uint32_t>(columns);
+  s.right_greys = arena.array<std::uint8_t>(columns + lanes);
+  s.partner_exists = arena.array<std::uint8_t>(columns + lanes);
   return s;
 }
 

@@ -31,32 +31,56 @@ struct SadCandidate {
   }
 };
 
+/// A window of 15x15 pixels sums up to 57,375: what lanes of 16 bits hold.
+inline constexpr int kLargestSadLaneBlock = 15;
+
+/// How windows clipped at the left end of the right picture compare with the whole ones of the same left column, for
+/// blocks up to kLargestBlock: sum x weight + rank is the smaller, the smaller the mean; of equal means, the smaller
+/// the disparity. Exact: weights are kMultiple / columns x kRanks, and 11 x 255 x kMultiple x kRanks < 2^32.
+struct RankedKeys {
+  static constexpr int kRanks = 8;
+  static constexpr int kLargestBlock = 11;
+  static constexpr int kMultiple = 27720;  ///< of 1..11
+
+  [[nodiscard]] static constexpr std::uint32_t weight(int columns) noexcept {
+    return static_cast<std::uint32_t>(kMultiple / columns * kRanks);
+  }
+
+  alignas(16) std::uint32_t weights[kRanks] = {};  ///< of falling disparities; 0 where there is none
+  alignas(16) std::uint32_t ranks[kRanks] = {};    ///< from 1 up, whole ones have 0; 0xFFFFFFFF where there is none
+  std::int32_t lane = 0;                           ///< of the first
+};
+
 /// Memory of both ways. A call touches what its region, its margin of half a block and its range need, no more.
 struct SadScratch {
-  [[nodiscard]] static SadScratch create(int width, int disparities, Arena& arena) noexcept;
+  [[nodiscard]] static SadScratch create(int width, int block, int disparities, Arena& arena) noexcept;
 
+  std::span<std::uint8_t> distances;        ///< [row of the window][column of the region][lane]
   std::span<std::uint16_t> column_sums;     ///< [column of the region][lane], over the rows of the window
   std::span<std::uint16_t> window_sums;     ///< [lane]
   std::span<std::uint16_t> batch_sums;      ///< [pixel of kPixelStep][lane], beside the borders
   std::span<std::uint32_t> reference_sums;  ///< [disparity], window sums of the plain way
   std::span<WindowLimits> limits;           ///< [column of the region]
-  std::span<std::uint16_t> left_enters;     ///< [column of the region] greys of the row that enters the window
-  std::span<std::uint16_t> left_leaves;     ///< and of the one that leaves it
-  std::span<std::uint16_t> right_enters;    ///< [column of the region + lane] likewise, 0 where there is no partner
-  std::span<std::uint16_t> right_leaves;    ///< likewise
-  std::span<std::uint16_t> partner_exists;  ///< [column of the region + lane] 0 or 0xFFFF
+  std::span<RankedKeys> ranked;             ///< [column of the region]
+  std::span<std::uint32_t> whole_weights;   ///< [column of the region] of RankedKeys
+  std::span<std::uint32_t> rank_zero;       ///< [column of the region] the id that rank 0 would have
+  std::span<std::uint32_t> left_greys;      ///< [column of the region] four times, of the row that enters the window
+  std::span<std::uint8_t> right_greys;     ///< [column of the region + lane] likewise once, 0 where there is no partner
+  std::span<std::uint8_t> partner_exists;  ///< [column of the region + lane] 0 or 0xFF
 };
-
-/// A window of 15x15 pixels sums up to 57,375: what lanes of 16 bits hold.
-inline constexpr int kLargestSadLaneBlock = 15;
 
 /// The plain reference, any block: the equations of SadMatcher, column sums and window sums kept up to date.
 [[nodiscard]] DisparityCounts sad_reference(const SadTask& task, SadScratch& scratch) noexcept;
 
 /// The same bit for bit with disparities in vector lanes, block <= kLargestSadLaneBlock; the instruction set is
-/// Highway's choice (see use_simd). About one instruction a pixel and disparity: a column's sums are brought to the
-/// new row in the pass that adds them to the window and takes the minimum, and eight pixels share the search for
-/// the smallest lane. Windows that the right picture's ends clip are compared as exact fractions.
+/// Highway's choice (see use_simd). With AVX2 0.9 instructions a pixel and disparity far from the borders:
+///   - absolute differences are made of bytes, and kept until their row leaves the window,
+///   - a column's sums are brought to the new row in the pass that adds them to the window and takes the minimum,
+///   - the larger half of a chunk of disparities is compared with the smaller one in a single minimum: an even sum is
+///     of the one, an odd one of the other (x86, blocks up to 11; 16 bits hold no more),
+///   - four pixels share the search for the smallest lane.
+/// Beside the borders about 2.5. Windows that the right picture's ends clip are compared as exact fractions; four
+/// pixels at a time where it is the left end that clips (RankedKeys).
 [[nodiscard]] DisparityCounts sad_lanes(const SadTask& task, SadScratch& scratch) noexcept;
 
 }  // namespace stereotrack

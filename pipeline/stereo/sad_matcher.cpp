@@ -20,7 +20,7 @@ Result<SadMatcher> SadMatcher::create(const Config& config, Arena& arena) noexce
   if (!sizes_fit || !block_fits || !ranges_fit) return fail(Fault::kBadConfig);
 
   m.spans_ = arena.array<Span>(static_cast<std::size_t>(c.height));
-  m.scratch_ = SadScratch::create(c.width, std::max(c.range.count(), c.region_disparities), arena);
+  m.scratch_ = SadScratch::create(c.width, c.block, std::max(c.range.count(), c.region_disparities), arena);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return m;
 }

@@ -22,10 +22,10 @@ namespace stereotrack {
 /// In: rectified greys, 0..255. Out: disparity in 1/16 px (see disparity.hpp), only wanted pixels written.
 /// Faults: kBadConfig, kOutOfMemory at create(); kBadSize (pictures or mask of another size), kBadConfig
 /// (range outside the stated maximum) at run, `out` then untouched.
-/// Cost: O(1) a pixel and disparity whatever the block: two absolute differences into the column sums, two
-/// column sums into the window; in vector lanes, see sad_kernel.hpp. Blocks over kLargestSadLaneBlock take the plain
-/// way, some fifty times slower. A region costs (area + its margin of half a block) x range, in memory too.
-/// Memory: 2 bytes x width x largest range. One instance a thread.
+/// Cost: O(1) a pixel and disparity whatever the block: an absolute difference, and the one that leaves, into the
+/// column sums, two column sums into the window; in vector lanes, see sad_kernel.hpp. Blocks over kLargestSadLaneBlock
+/// take the plain way, some fifty times slower. A region costs (area + its margin of half a block) x range, in memory
+/// too. Memory: (2 + block) bytes x width x largest range. One instance a thread.
 class SadMatcher {
  public:
   struct Config {
