@@ -19,7 +19,7 @@
 #include "drivers/capture/synthetic/synthetic_source.hpp"
 #include "drivers/telemetry/encoder.hpp"
 #include "pipeline/core/simd.hpp"
-#include "pipeline/photometry/gray.hpp"
+#include "pipeline/photometry/ingest.hpp"
 #include "pipeline/pipeline.hpp"
 #include "pipeline/stereo/census_matcher.hpp"
 #include "pipeline/stereo/sad_matcher.hpp"
@@ -231,8 +231,8 @@ void mark_matcher(Marks& marks, const std::string& name, const FramePair& pair, 
   const ImageView<std::uint8_t> left = arena.image<std::uint8_t>(kWidth, kHeight);
   const ImageView<std::uint8_t> right = arena.image<std::uint8_t>(kWidth, kHeight);
   const ImageView<std::uint16_t> out = arena.image<std::uint16_t>(kWidth, kHeight);
-  gray(pair.left, left);
-  gray(pair.right, right);
+  ingest_picture(pair.left, {.y = left, .cb = {}, .cr = {}}, nullptr);
+  ingest_picture(pair.right, {.y = right, .cb = {}, .cr = {}}, nullptr);
   typename Matcher::Config config;
   config.width = kWidth;
   config.height = kHeight;
