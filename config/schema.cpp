@@ -70,6 +70,9 @@ std::vector<Key> keys_of(Configuration& c) {
           "Frames whose mean is the background (3.7); until then the mean of those seen, flagged as learning."),
       key("background.window", p.background.adaptive.window, 2, 1024, "frames",
           "Memory of the adaptive background: longer is steadier, shorter follows the light faster."),
+      key("background.pull", p.background.adaptive.pull, 0, 8, "mean deviations",
+          "With one view alone: how far a picture pulls a pixel's mean and noise at most. Lower keeps dense traffic "
+          "out of them, higher calms leaves; 0: without bound, as always with two views."),
       key("background.absorb_frames", p.background.adaptive.absorb_frames, 2, 60000, "frames",
           "What stands still for so long becomes background."),
       key("background.noise_floor", p.background.adaptive.noise_floor, 1, 4096, "1/256 grey level",

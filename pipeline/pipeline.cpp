@@ -138,8 +138,10 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
     if (setup_.colour && !(keep(mean_cb_, mean(), outcome) && keep(mean_cr_, mean(), outcome))) return outcome;
     if (!keep(sobel_, Sobel::create({}, width, height, arena), outcome)) return outcome;
   } else {
-    if (!keep(background_left_, AdaptiveBackground::create(background.adaptive, width, height, setup_.colour, arena),
-              outcome) ||
+    // Two views confirm a region by its depth, and there a lower threshold adds weak pieces that become tracks.
+    AdaptiveBackground::Config adaptive = background.adaptive;
+    if (setup_.calibration != nullptr) adaptive.pull = 0;
+    if (!keep(background_left_, AdaptiveBackground::create(adaptive, width, height, setup_.colour, arena), outcome) ||
         !keep(foreground_left_, ForegroundMask::create(config_.foreground, width, height, arena), outcome) ||
         !keep(closing_, Closing::create({.repeats = shape.closing}, width, height, arena), outcome)) {
       return outcome;
@@ -209,8 +211,9 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
     return outcome;
   }
   if (config_.background.method == ForegroundMethod::kAdaptive) {
-    if (!keep(background_right_, AdaptiveBackground::create(config_.background.adaptive, width, height, false, arena),
-              outcome) ||
+    AdaptiveBackground::Config adaptive = config_.background.adaptive;
+    adaptive.pull = 0;  // as on the left
+    if (!keep(background_right_, AdaptiveBackground::create(adaptive, width, height, false, arena), outcome) ||
         !keep(foreground_right_, ForegroundMask::create(config_.foreground, width, height, arena), outcome)) {
       return outcome;
     }
