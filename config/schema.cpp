@@ -134,6 +134,10 @@ std::vector<Key> keys_of(Configuration& c) {
       key("shadow.weak_percent", p.shadow.test.weak_percent, 0, 90, "%",
           "Parts of a region that stand out less than this part of the region do, and show the background's texture, "
           "are its reflection or haze; 0: off."),
+      key("shadow.deep", p.shadow.deep,
+          "With one view alone: what lies flat at an object's foot and is darker than darkest_percent is shadow, too. "
+          "Off "
+          "for a camera that looks straight down."),
       key("shadow.disparity_px", p.shadow.test.disparity_px, 0, 16, "px",
           "Disparities this near count as the background's own."),
       key("shadow.own_depth_px", p.shadow.own_depth_px, 0, 16, "px",

@@ -158,6 +158,13 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
       !keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, arena), outcome)) {
     return outcome;
   }
+  if (config_.shadow.method == ShadowMethod::kStereo && config_.shadow.deep && setup_.calibration == nullptr &&
+      !edges &&
+      !keep(umbra_test_,
+            UmbraTest::create({.darkest_percent = config_.shadow.test.darkest_percent}, width, height, arena),
+            outcome)) {
+    return outcome;
+  }
   if (shape.level_set) {
     (void)(keep(level_set_, LevelSet::create(shape.level_set_config, width, height, arena), outcome) &&
            keep(convex_hull_, ConvexHull::create({}, width, height, arena), outcome));
@@ -592,6 +599,7 @@ void Pipeline::remove_shadows() noexcept {
   } else if (background_left_) {
     measure_strength();
     (void)shadow_test_->run(shadow_input(), left_.mask);
+    if (umbra_test_) (void)umbra_test_->run(left_.smooth_y, background_left_->luma(), left_.mask);
   }
   for (const Blob& blob : blobs_.blobs) {
     std::int32_t rest = 0;
