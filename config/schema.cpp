@@ -70,6 +70,9 @@ std::vector<Key> keys_of(Configuration& c) {
           "Frames whose mean is the background (3.7); until then the mean of those seen, flagged as learning."),
       key("background.window", p.background.adaptive.window, 2, 1024, "frames",
           "Memory of the adaptive background: longer is steadier, shorter follows the light faster."),
+      key("background.pull", p.background.adaptive.pull, 0, 8, "mean deviations",
+          "With one view alone: how far a picture pulls a pixel's mean and noise at most. Lower keeps dense traffic "
+          "out of them, higher calms leaves; 0: without bound, as always with two views."),
       key("background.absorb_frames", p.background.adaptive.absorb_frames, 2, 60000, "frames",
           "What stands still for so long becomes background."),
       key("background.noise_floor", p.background.adaptive.noise_floor, 1, 4096, "1/256 grey level",
@@ -131,6 +134,10 @@ std::vector<Key> keys_of(Configuration& c) {
       key("shadow.weak_percent", p.shadow.test.weak_percent, 0, 90, "%",
           "Parts of a region that stand out less than this part of the region do, and show the background's texture, "
           "are its reflection or haze; 0: off."),
+      key("shadow.deep", p.shadow.deep,
+          "With one view alone: what lies flat at an object's foot and is darker than darkest_percent is shadow, too. "
+          "Off "
+          "for a camera that looks straight down."),
       key("shadow.disparity_px", p.shadow.test.disparity_px, 0, 16, "px",
           "Disparities this near count as the background's own."),
       key("shadow.own_depth_px", p.shadow.own_depth_px, 0, 16, "px",

@@ -152,8 +152,10 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
     memory_.charge(MemoryPart::kBackground, arena);
     if (!keep(sobel_, Sobel::create({}, width, height, arena), outcome)) return outcome;
   } else {
-    if (!keep(background_left_, AdaptiveBackground::create(background.adaptive, width, height, setup_.colour, arena),
-              outcome)) {
+    // Two views confirm a region by its depth, and there a lower threshold adds weak pieces that become tracks.
+    AdaptiveBackground::Config adaptive = background.adaptive;
+    if (setup_.calibration != nullptr) adaptive.pull = 0;
+    if (!keep(background_left_, AdaptiveBackground::create(adaptive, width, height, setup_.colour, arena), outcome)) {
       return outcome;
     }
     memory_.charge(MemoryPart::kBackground, arena);
@@ -175,6 +177,13 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
   }
   memory_.charge(MemoryPart::kShapes, arena);
   if (!keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, arena), outcome)) return outcome;
+  if (config_.shadow.method == ShadowMethod::kStereo && config_.shadow.deep && setup_.calibration == nullptr &&
+      !edges &&
+      !keep(umbra_test_,
+            UmbraTest::create({.darkest_percent = config_.shadow.test.darkest_percent}, width, height, arena),
+            outcome)) {
+    return outcome;
+  }
   memory_.charge(MemoryPart::kShadow, arena);
   if (shape.level_set) {
     (void)(keep(level_set_, LevelSet::create(shape.level_set_config, width, height, arena), outcome) &&
@@ -234,8 +243,9 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
   memory_.charge(MemoryPart::kRegions, arena);
   const bool adaptive = config_.background.method == ForegroundMethod::kAdaptive;
   if (adaptive) {
-    if (!keep(background_right_, AdaptiveBackground::create(config_.background.adaptive, width, height, false, arena),
-              outcome)) {
+    AdaptiveBackground::Config background = config_.background.adaptive;
+    background.pull = 0;  // as on the left
+    if (!keep(background_right_, AdaptiveBackground::create(background, width, height, false, arena), outcome)) {
       return outcome;
     }
     memory_.charge(MemoryPart::kBackground, arena);
@@ -659,6 +669,7 @@ void Pipeline::remove_shadows() noexcept {
   } else if (background_left_) {
     measure_strength();
     (void)shadow_test_->run(shadow_input(), left_.mask);
+    if (umbra_test_) (void)umbra_test_->run(left_.smooth_y, background_left_->luma(), left_.mask);
   }
   for (const Blob& blob : blobs_.blobs) {
     std::int32_t rest = 0;

@@ -14,6 +14,7 @@
 #include "pipeline/geometry/rectify.hpp"
 #include "pipeline/memory_use.hpp"
 #include "pipeline/motion/mean_background.hpp"
+#include "pipeline/motion/umbra_test.hpp"
 #include "pipeline/pipeline_config.hpp"
 #include "pipeline/shape/contour_fill.hpp"
 #include "pipeline/shape/morphology.hpp"
@@ -180,6 +181,7 @@ class Pipeline {
   std::optional<ConvexHull> convex_hull_;
   std::optional<LevelSet> level_set_;
   std::optional<ShadowTest> shadow_test_;
+  std::optional<UmbraTest> umbra_test_;
   std::optional<Rectifier> rectifier_;
   std::optional<SadMatcher> sad_;
   std::optional<CensusMatcher> census_;

@@ -64,6 +64,7 @@ struct DisparityConfig {
 struct ShadowConfig {
   ShadowMethod method = ShadowMethod::kStereo;
   ShadowTest::Config test;
+  bool deep = true;           ///< with one view alone: UmbraTest at an object's foot
   double own_depth_px = 1.0;  ///< a region this near to the background's own disparity is none, 0..16 [px]
 };
 

@@ -10,8 +10,9 @@ namespace stereotrack {
 Result<AdaptiveBackground> AdaptiveBackground::create(const Config& config, int width, int height, bool colour,
                                                       Arena& arena) noexcept {
   if (config.window < 2 || config.window > 1024 || config.absorb_frames < 2 || config.absorb_frames > 60000 ||
-      config.noise_floor < 1 || config.noise_floor > 4096 || config.edge_percent < 0 || config.edge_percent > 200 ||
-      config.relearn_percent < 1 || config.relearn_percent > 100) {
+      config.pull < 0 || config.pull > 8 || config.noise_floor < 1 || config.noise_floor > 4096 ||
+      config.edge_percent < 0 || config.edge_percent > 200 || config.relearn_percent < 1 ||
+      config.relearn_percent > 100) {
     return fail(Fault::kBadConfig);
   }
   if (width < 1 || height < 1) return fail(Fault::kBadSize);
@@ -91,7 +92,7 @@ void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t>
 }
 
 void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8_t> mask) noexcept {
-  const LearnRates rates{.window = config_.window, .absorb = config_.absorb_frames};
+  const LearnRates rates{.window = config_.window, .absorb = config_.absorb_frames, .pull = config_.pull};
   const auto channel = [](ImageView<const std::uint8_t> plane, const Channel& known, int y) {
     return LearnRow::Channel{plane.row(y), known.mean.row(y), known.deviation.row(y), known.candidate.row(y)};
   };

@@ -16,8 +16,13 @@ namespace stereotrack {
 /// Per pixel: mean m of luma (and of Cb, Cr), mean absolute deviation a of each, number of frames n in which
 /// the pixel looked so, and one candidate: another look, seen lately, with its own count. On a pixel that
 /// is not foreground
-///     m <- m + (x - m) / r,   a <- a + (|x - m| - a) / (r + 8),   r = min(n + 1, window)
-/// so the first frames give the plain mean (3.7) and later ones an exponential window. On a foreground pixel
+///     m <- m + s / r,   a <- a + (|s| - a) / (r + 8),   r = min(n + 1, window)
+///     s = x - m, but no longer than pull a + 1 grey level
+/// so the first frames give the mean (3.7) and later ones an exponential window. The bound is for what passes under
+/// the threshold of the foreground: unbounded, parts of passing objects are learnt as noise, and that hides larger
+/// parts of the next ones. A second look, far away, in a part q of a pixel's frames (leaves before the sky) pulls the
+/// mean away by q pull a / (1 - q) and keeps the deviation up where 2 q pull >= 1: with a pull of 3 it is noise from
+/// a sixth of the frames on, and foreground where it is rarer. On a foreground pixel
 /// the candidate learns instead. When the candidate has been seen more often than the background, and at least
 /// 9 times (counts saturate at absorb_frames), they change places: what was there at start and left, dissolves
 /// quickly; what stops in view, is absorbed after absorb_frames.
@@ -38,6 +43,7 @@ class AdaptiveBackground {
 
   struct Config {
     int window = 60;           ///< frames of the exponential window, 2..1024
+    int pull = 3;              ///< mean absolute deviations that a sample pulls at most, 0..8; 0 = without bound
     int absorb_frames = 300;   ///< frames after which what stands still is background, 2..60000
     int noise_floor = 256;     ///< added to the standard deviation [1/256 grey level], 1..4096
     int edge_percent = 75;     ///< e: tolerated shift of an edge [% of the 3x3 range], 0..200

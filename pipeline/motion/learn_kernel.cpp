@@ -23,6 +23,9 @@ constexpr int kPriorDeviation = 3 * 256;
 constexpr int kPriorFrames = 8;
 // How far a pixel may be from its candidate and still be the same look [8.8].
 constexpr int kCandidateReach = 12 * 256;
+// A bounded sample may pull this far beyond its deviations [8.8]: a deviation of 0 must be able to grow, as 8 bits of a
+// still picture have none.
+constexpr int kPullAtLeast = 256;
 constexpr int kForget = AdaptiveBackground::kForget;
 constexpr int kGhost = AdaptiveBackground::kGhost;
 constexpr int kGhostFrames = AdaptiveBackground::kGhostFrames;
@@ -111,6 +114,10 @@ Word divide(Word n, const Divisors& by) { return divide(n, by.even, by.odd); }
 /// From one value to another: one of the ways is 0, the other is their distance.
 struct Apart {
   Apart(Word from, Word to) : up(hn::SaturatedSub(to, from)), down(hn::SaturatedSub(from, to)) {}
+  Apart(Word from, Word to, Word most) : Apart(from, to) {
+    up = hn::Min(up, most);
+    down = hn::Min(down, most);
+  }
   [[nodiscard]] Word distance() const { return hn::Or(up, down); }
   /// As step_towards(); the step is no longer than the way.
   template <class By>
@@ -127,6 +134,14 @@ Word now_of(const LearnRow::Channel& channel, int x) {
   return hn::ShiftLeft<8>(hn::PromoteTo(kWords, hn::LoadU(d8, channel.now + x)));
 }
 
+// How far a sample pulls at most.
+Word farthest(Word deviation, int pull) {
+  if (pull == 0) return word(65535);
+  Word most = word(kPullAtLeast);
+  for (int i = 0; i < pull; ++i) most = hn::SaturatedAdd(most, deviation);
+  return most;
+}
+
 // Vectors in which all pixels are background.
 template <class By>
 void learn_calm(const LearnRow& row, const LearnRates& rates, int x, const By& by_rate, const By& by_slower) {
@@ -134,7 +149,8 @@ void learn_calm(const LearnRow& row, const LearnRates& rates, int x, const By& b
     const LearnRow::Channel& channel = row.channels[c];
     const Word mean = hn::LoadU(kWords, channel.mean + x);
     const Word deviation = hn::LoadU(kWords, channel.deviation + x);
-    const Apart from_mean(mean, now_of(channel, x));
+    const Word most = farthest(deviation, rates.pull);
+    const Apart from_mean(mean, now_of(channel, x), most);
     const Apart from_deviation(deviation, from_mean.distance());
     hn::StoreU(from_mean.step_from(mean, by_rate), kWords, channel.mean + x);
     hn::StoreU(from_deviation.step_from(deviation, by_slower), kWords, channel.deviation + x);
@@ -182,8 +198,10 @@ int learn_mixed(const LearnRow& row, const LearnRates& rates, int x, Word mask, 
     const Word deviation = hn::LoadU(kWords, channel.deviation + x);
     const Word candidate = hn::LoadU(kWords, channel.candidate + x);
     const Word followed = hn::IfThenElse(renewed, now, step_towards(candidate, now, candidate_even, candidate_odd));
-    const Word calm_mean = step_towards(mean, now, rate_even, rate_odd);
-    const Word calm_deviation = step_towards(deviation, distance_of(now, mean), slower_even, slower_odd);
+    const Word most = farthest(deviation, rates.pull);
+    const Word near = hn::Min(hn::Max(now, hn::SaturatedSub(mean, most)), hn::SaturatedAdd(mean, most));
+    const Word calm_mean = step_towards(mean, near, rate_even, rate_odd);
+    const Word calm_deviation = step_towards(deviation, distance_of(near, mean), slower_even, slower_odd);
 
     const Word kept_mean = hn::IfThenElse(exchanged, followed, hn::IfThenElse(calm, calm_mean, mean));
     const Word kept_deviation = hn::IfThenElse(calm, calm_deviation, deviation);
@@ -274,8 +292,9 @@ void blend(const LearnRow& row, const LearnRates& rates, int x) noexcept {
   const int rate = std::min(row.age[x] + 1, rates.window);
   for (int c = 0; c < row.count; ++c) {
     const LearnRow::Channel& channel = row.channels[c];
-    const int apart = now_at(channel, x) - channel.mean[x];
     const int deviation = channel.deviation[x];
+    const int most = rates.pull == 0 ? 65535 : rates.pull * deviation + kPullAtLeast;
+    const int apart = std::clamp(now_at(channel, x) - channel.mean[x], -most, most);
     channel.mean[x] = static_cast<std::uint16_t>(channel.mean[x] + apart / rate);
     channel.deviation[x] =
         static_cast<std::uint16_t>(deviation + (std::abs(apart) - deviation) / (rate + kPriorFrames));

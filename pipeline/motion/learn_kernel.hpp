@@ -23,6 +23,7 @@ struct LearnRow {
 struct LearnRates {
   int window = 60;   ///< 2..1024 [frames]
   int absorb = 300;  ///< 2..60000 [frames]
+  int pull = 0;      ///< of a sample at most, 0..8 [mean absolute deviations]; 0 = without bound
 };
 
 /// Learns one row, as AdaptiveBackground says; how many of its pixels were foreground. The definition stands beside it,

@@ -140,6 +140,38 @@ TEST(AdaptiveBackground, SmallestSpreadIsTheNoiseFloor) {
   EXPECT_GE(watch.distance(30, 30), 4 * kStep);
 }
 
+TEST(AdaptiveBackground, WhatPassesUnderTheThresholdIsHardlyLearntAsNoise) {
+  // In every tenth frame something 9 levels brighter passes, too faint to be foreground. With a pull of 2 the deviation
+  // of 0.6 rises to 1.2, without bound to 1.8, so that what comes later stands out 1.3 times as much.
+  const cv::Rect road(20, 20, 40, 20);
+  const cv::Mat_<float> empty(kSize, 100.0F);
+  const cv::Mat_<float> faint = with_object(empty, road, 109);
+  const auto strength = [&](int pull) {
+    AdaptiveBackground::Config c = config();
+    c.pull = pull;
+    Watch watch(c);
+    for (int t = 0; t < 300; ++t) watch.step(t % 10 == 4 ? faint : empty);
+    EXPECT_LE(watch.foreground(road), 0.01);
+    watch.look(with_object(empty, road, 122));
+    return cv::mean(watch.distance(inner(road, 2)))[0] / kStep;
+  };
+  const double bounded = strength(2);
+  EXPECT_GE(bounded, kForegroundSd);
+  EXPECT_GE(bounded, 1.15 * strength(0));
+}
+
+TEST(AdaptiveBackground, LookOfAThirdOfTheFramesIsNoise) {
+  Watch watch;
+  const cv::Rect leaf(20, 20, 40, 20);
+  const cv::Mat_<float> sky(kSize, 100.0F);
+  const cv::Mat_<float> leaves = with_object(sky, leaf, 112);
+  for (int t = 0; t < 300; ++t) watch.step(t % 3 == 2 ? leaves : sky);
+  watch.look(leaves);
+  EXPECT_LE(watch.foreground(leaf), 0.02);
+  watch.look(sky);
+  EXPECT_LE(watch.foreground(leaf), 0.02);
+}
+
 TEST(AdaptiveBackground, DistanceSaturates) {
   Watch watch;
   Plane picture(kSize, std::uint8_t{100});
@@ -413,6 +445,8 @@ TEST(AdaptiveBackground, Faults) {
   EXPECT_EQ(fault_of([](auto& c) { c.window = 1025; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.absorb_frames = 1; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.absorb_frames = 60001; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.pull = -1; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.pull = 9; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.noise_floor = 0; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.noise_floor = 4097; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.edge_percent = -1; }), Fault::kBadConfig);

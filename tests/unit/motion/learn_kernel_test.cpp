@@ -13,7 +13,7 @@ namespace {
 using test::kRowLengths;
 using test::on_each_target;
 
-constexpr LearnRates kRates{.window = 60, .absorb = 300};
+constexpr LearnRates kRates{.window = 60, .absorb = 300, .pull = 2};
 
 /// The state of a row, owned, and the pictures that it learns from.
 struct State {
@@ -83,7 +83,7 @@ Sight sight_of(std::size_t size, Draw& draw, int frame) {
 
 TEST(LearnKernel, SequencesOfPicturesLeaveTheReferencesState) {
   constexpr std::size_t kSize = 333;
-  for (const LearnRates& rates : {kRates, LearnRates{2, 2}, LearnRates{1024, 60000}, LearnRates{30, 12}}) {
+  for (const LearnRates& rates : {kRates, LearnRates{2, 2, 0}, LearnRates{1024, 60000, 8}, LearnRates{30, 12, 1}}) {
     for (const int colours : {1, 3}) {
       on_each_target([&] {
         Draw draw(9);
@@ -120,7 +120,7 @@ TEST(LearnKernel, EveryLengthIsTheReferenceAndNothingBeyondIsTouched) {
 /// Rows of 65536 pixels: every distance that a picture can have from a mean, for one age after the other.
 TEST(LearnKernel, EveryQuotientIsTheReference) {
   constexpr int kSize = 65536;
-  const LearnRates rates{1024, 60000};
+  const LearnRates rates{1024, 60000, 0};
   Sight sight;
   sight.mask.assign(kSize, 0);
   for (const int now : {0, 131, 255}) {
@@ -146,7 +146,7 @@ TEST(LearnKernel, EveryQuotientIsTheReference) {
 TEST(LearnKernel, AnyStateIsTheReference) {
   constexpr std::size_t kSize = 20000;
   Draw draw(77);
-  for (const LearnRates& rates : {kRates, LearnRates{2, 2}, LearnRates{1024, 60000}}) {
+  for (const LearnRates& rates : {kRates, LearnRates{2, 2, 8}, LearnRates{1024, 60000, 0}}) {
     State state = empty_state(kSize);
     Sight sight = sight_of(kSize, draw, 30);
     for (std::size_t x = 0; x < kSize; ++x) {

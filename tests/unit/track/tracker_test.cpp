@@ -484,10 +484,9 @@ TEST_F(TrackerOf, TargetThatLosesItsDetectionTakesOverThePartInItsPlace) {
   };
   // A leg is seen, then the body above it that hides it: of another size, and at another depth where it is large. What
   // is not large and at another depth passes before the leg.
-  for (const Case& one : {Case{"over it, large", {190, 120, 240, 140}, 32, 1},
-                          Case{"over it, at its depth", {190, 120, 120, 100}, 16, 1},
-                          Case{"over it, small, nearer", {190, 120, 120, 100}, 32, 2},
-                          Case{"beside it", {280, 120, 120, 100}, 16, 2}}) {
+  for (const Case& one :
+       {Case{"over it, large", {190, 120, 240, 140}, 32, 1}, Case{"over it, at its depth", {190, 120, 120, 100}, 16, 1},
+        Case{"over it, small, nearer", {190, 120, 120, 100}, 32, 2}, Case{"beside it", {280, 120, 120, 100}, 16, 2}}) {
     make(config());
     const auto leg = [](int k) { return part_of(1, painted(box_at({100 + 8 * k, 160, 24, 60}, 16), kBlue)); };
     const auto body = [&](int k) {
