@@ -79,7 +79,7 @@ struct SadScratch {
 ///   - the larger half of a chunk of disparities is compared with the smaller one in a single minimum: an even sum is
 ///     of the one, an odd one of the other (x86, blocks up to 11; 16 bits hold no more),
 ///   - four pixels share the search for the smallest lane.
-/// Beside the borders about 2.5. Windows that the right picture's ends clip are compared as exact fractions; four
+/// Beside the borders about 3. Windows that the right picture's ends clip are compared as exact fractions; four
 /// pixels at a time where it is the left end that clips (RankedKeys).
 [[nodiscard]] DisparityCounts sad_lanes(const SadTask& task, SadScratch& scratch) noexcept;
 
