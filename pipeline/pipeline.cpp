@@ -482,7 +482,7 @@ RegionMatch Pipeline::match_region(LazyCanvas& left, LazyCanvas& right, LazyCanv
                                    const RegionMatcher::Search& search) noexcept {
   const Rect partners = grown(partners_of(roi, search.range), region_matcher_->config().row_tolerance);
   const Result<RegionMatch> found =
-      region_matcher_->run(left.with(roi), right.with(partners), search, right_moving.with(partners));
+      region_matcher_->match_taken(left.with(roi), right.with(partners), search, right_moving.with(partners));
   return found.has_value() ? *found : RegionMatch{};
 }
 

@@ -33,7 +33,7 @@ class Equalise {
 
   explicit Equalise(const Config& config) noexcept : mode_(config.mode) {}
 
-  /// Whether the next run() asks for a histogram.
+  /// Whether a histogram is wanted of the next picture.
   [[nodiscard]] bool needs_histogram() const noexcept {
     return mode_ == EqualiseMode::kFrame || (mode_ == EqualiseMode::kFrozen && !has_table_);
   }

@@ -47,8 +47,8 @@ struct RegionMatch {
 /// counts is left. What counts: E up to enough_uniqueness max(E*, noise^2), and up to most_cost; so the results are
 /// those of the whole sum.
 ///
-/// In: rectified greys, 0..255; the region: pixels of the left picture, all of them take()n before a run() or, as
-/// pixels of `rect` that carry `label`, by it; `right_foreground` of the right picture's size (0 = background) or
+/// In: rectified greys, 0..255; the region: pixels of the left picture, all of them take()n before a match_taken() or,
+/// as pixels of `rect` that carry `label`, by it; `right_foreground` of the right picture's size (0 = background) or
 /// empty. Disparities as in disparity.hpp. An empty region or one without candidates is no fault: found = false.
 /// Faults: kBadConfig, kOutOfMemory at create(); kBadSize, kBadConfig (range over the stated maximum) at run.
 /// Cost: O(min(region, largest_sample) x range x (2 row_tolerance + 1)) at most, and a tenth of it for what has
@@ -91,8 +91,9 @@ class RegionMatcher {
   }
 
   /// Matches the region that was taken last, of which `left` gives the greys.
-  [[nodiscard]] Result<RegionMatch> run(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
-                                        const Search& search, ImageView<const std::uint8_t> right_foreground) noexcept {
+  [[nodiscard]] Result<RegionMatch> match_taken(ImageView<const std::uint8_t> left, ImageView<const std::uint8_t> right,
+                                                const Search& search,
+                                                ImageView<const std::uint8_t> right_foreground) noexcept {
     if (const auto fault = check(left, right, search.range, right_foreground)) return fail(*fault);
     read_greys(left);
     return best_match(right, search, right_foreground);
@@ -106,7 +107,7 @@ class RegionMatcher {
     if (const auto fault = check(left, right, range, right_foreground)) return fail(*fault);
     take(intersect(rect, {0, 0, labels.width, labels.height}),
          [&](int x, int y) noexcept { return labels.at(x, y) == label; });
-    return run(left, right, {.range = range}, right_foreground);
+    return match_taken(left, right, {.range = range}, right_foreground);
   }
 
  private:
@@ -168,6 +169,7 @@ class RegionMatcher {
   std::span<double> scores_;  ///< E, [row offset][d - range.min]; kNoScore where no candidate exists, kLeft where left
   std::span<double> shares_;  ///< share, likewise
 };
-static_assert(RealTimeStage<RegionMatcher, &RegionMatcher::run<std::uint8_t>, &RegionMatcher::run<std::uint16_t>>);
+static_assert(RealTimeStage<RegionMatcher, &RegionMatcher::match_taken, &RegionMatcher::run<std::uint8_t>,
+                            &RegionMatcher::run<std::uint16_t>>);
 
 }  // namespace stereotrack

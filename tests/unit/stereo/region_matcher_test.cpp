@@ -170,7 +170,8 @@ TEST(RegionMatcher, WhatDoesNotCountLeavesNoTrace) {
     ASSERT_TRUE(matcher.has_value());
     matcher->take({0, 0, left.cols, left.rows}, [&](int x, int y) { return labels.at<std::uint8_t>(y, x) == 1; });
     const auto run = [&](const RegionMatcher::Search& search) {
-      return *matcher->run(view<std::uint8_t>(left), view<std::uint8_t>(right), search, view<std::uint8_t>(moving));
+      return *matcher->match_taken(view<std::uint8_t>(left), view<std::uint8_t>(right), search,
+                                   view<std::uint8_t>(moving));
     };
     for (const DisparityRange range : {DisparityRange{0, 63}, {0, 79}, {d - 1, d + 1}, {d - 5, d + 14}}) {
       const RegionMatch whole = run({.range = range});
