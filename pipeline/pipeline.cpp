@@ -323,6 +323,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   result.labels = blobs_.labels;
   result.detections = detections;
   for (std::size_t i = 0; i < kRejections; ++i) result.rejections[i] = rejections_[i] + detector_->rejections()[i];
+  result.hulls_reduced = detector_->hulls_reduced() + (convex_hull_ ? convex_hull_->reduced() : 0);
   return result;
 }
 
@@ -362,10 +363,13 @@ void Pipeline::find_foreground() noexcept {
 }
 
 // What found no room is counted, whichever part of the frame it was lost in.
+void Pipeline::count_no_room(int dropped) noexcept {
+  rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] += static_cast<std::uint32_t>(dropped);
+}
+
 void Pipeline::find_blobs(ImageView<const std::uint8_t> mask) noexcept {
   if (const auto blobs = blob_extractor_->run(mask); blobs.has_value()) blobs_ = *blobs;
-  rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] +=
-      static_cast<std::uint32_t>(blobs_.dropped_blobs) + static_cast<std::uint32_t>(blobs_.dropped_runs);
+  count_no_room(blobs_.dropped_blobs + blobs_.dropped_runs);
 }
 
 void Pipeline::foreground_from_edges() noexcept {
@@ -385,6 +389,7 @@ void Pipeline::foreground_from_edges() noexcept {
 void Pipeline::foreground_from_model() noexcept {
   background_left_->distance(left_planes(), left_.distance);
   const Result<double> part = foreground_left_->run(left_.distance, moving_);
+  count_no_room(foreground_left_->dropped_runs());
   light_change_ = part.has_value() && *part * 100 > config_.background.adaptive.relearn_percent;
   if (light_change_) fill(moving_, 0);
   (void)closing_->run(moving_, scratch_);
@@ -393,6 +398,7 @@ void Pipeline::foreground_from_model() noexcept {
   if (!rectifier_) return;
   background_right_->distance({right_.smooth_y, {}, {}}, right_.distance);
   (void)foreground_right_->run(right_.distance, right_.mask);
+  count_no_room(foreground_right_->dropped_runs());
   right_moving_.show(right_.mask);
   left_.background_canvas.show(background_left_->luma());
   right_.background_canvas.show(background_right_->luma());

@@ -57,7 +57,8 @@ struct FrameResult {
   ImageView<const std::uint8_t> mask;     ///< final object mask, raw left picture, 0 or 255
   ImageView<const std::uint16_t> labels;  ///< detection of each pixel, 0 = none
   std::span<const Detection> detections;
-  RejectionCounts rejections{};  ///< candidates rejected, by Rejection
+  RejectionCounts rejections{};     ///< candidates rejected, by Rejection
+  std::uint64_t hulls_reduced = 0;  ///< hulls with more vertices than there is room for, since create(): see ConvexHull
 };
 
 /// The whole algorithm: pairs in, targets out. A function of its state, the pixels and the capture times.
@@ -110,6 +111,7 @@ class Pipeline {
 
   void ingest(const FramePair& pair) noexcept;
   void find_foreground() noexcept;
+  void count_no_room(int dropped) noexcept;
   void find_blobs(ImageView<const std::uint8_t> mask) noexcept;
   void foreground_from_edges() noexcept;
   void foreground_from_model() noexcept;

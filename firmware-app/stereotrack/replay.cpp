@@ -201,6 +201,7 @@ class Replay {
     }
     summary_.flags |= result->flags;
     for (std::size_t i = 0; i < kRejections; ++i) summary_.rejections[i] += result->rejections[i];
+    summary_.hulls_reduced = result->hulls_reduced;
     tracks_.add(pair.ordinal, result->tracks);
     publish(pair, *result);
     if (renderer_) renderer_->draw(pair, *result);

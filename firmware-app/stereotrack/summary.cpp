@@ -108,6 +108,7 @@ void save_summary(const std::filesystem::path& path, const Summary& summary, con
     rejected[to_string(static_cast<Rejection>(i))] = summary.rejections[i];
   }
   json["candidates_rejected"] = rejected;
+  json["hulls_reduced"] = summary.hulls_reduced;
   json["telemetry_datagrams"] = summary.telemetry_sent;
   if (allocations_are_counted()) {
     json["allocations_after_warmup"] = summary.allocations_after_warmup;

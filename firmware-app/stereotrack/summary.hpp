@@ -66,6 +66,7 @@ struct Summary {
   std::uint64_t rows = 0;                 ///< of tracks.csv
   std::uint32_t flags = 0;                ///< FrameFlag bits of all frames together
   RejectionCounts rejections{};
+  std::uint64_t hulls_reduced = 0;  ///< hulls of targets with fewer vertices than they should have
   std::uint64_t deadline_misses = 0;
   std::uint64_t telemetry_sent = 0;
   std::uint64_t telemetry_dropped = 0;

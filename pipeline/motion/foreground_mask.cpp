@@ -44,7 +44,8 @@ Result<double> ForegroundMask::run(ImageView<const std::uint8_t> distance, Image
 }
 
 double ForegroundMask::keep_seeded(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept {
-  const int count = find_components(majority_, RunKind::kObject, runs_).kept;
+  const auto [count, dropped] = find_components(majority_, RunKind::kObject, runs_);
+  dropped_runs_ = dropped;
   std::fill_n(seeds_.begin(), count, 0);
   for (std::int32_t i = 0; i < count; ++i) {
     const Run& run = runs_[i];

@@ -39,6 +39,9 @@ class ForegroundMask {
   /// Fault: kBadSize, mask untouched. Returns the part of the picture that is foreground, 0..1.
   [[nodiscard]] Result<double> run(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept;
 
+  /// Runs of the last mask that found no room among max_runs: what lies below them counts as background.
+  [[nodiscard]] int dropped_runs() const noexcept { return dropped_runs_; }
+
  private:
   [[nodiscard]] double keep_seeded(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept;
 
@@ -47,6 +50,7 @@ class ForegroundMask {
   CandidateLimits limits_;
   int high_ = 0;
   int min_seeds_ = 0;
+  int dropped_runs_ = 0;
   CandidateWorkspace work_;
   BitMask majority_;
   std::span<Run> runs_;

@@ -8,8 +8,6 @@ std::int64_t turn(const Point& o, const Point& a, const Point& b) noexcept {
   return static_cast<std::int64_t>(a.x - o.x) * (b.y - o.y) - static_cast<std::int64_t>(a.y - o.y) * (b.x - o.x);
 }
 
-bool before(const Point& a, const Point& b) noexcept { return a.y != b.y ? a.y < b.y : a.x < b.x; }
-
 /// Removes the vertex whose triangle with its neighbours is least. n > 3.
 void drop_least(std::span<Point> vertices, std::size_t n) noexcept {
   std::size_t least = 0;
@@ -35,7 +33,7 @@ Result<ConvexHull> ConvexHull::create(const Config& config, int width, int heigh
   stage.config_ = config;
   stage.width_ = width;
   stage.height_ = height;
-  const std::size_t points = std::max(2 * static_cast<std::size_t>(height), 2 * Hull::capacity());
+  const std::size_t points = 2 * static_cast<std::size_t>(height);
   stage.points_ = arena.array<Point>(points);
   stage.vertices_ = arena.array<Point>(2 * points);
   if (stage.points_.empty() || stage.vertices_.empty()) return fail(Fault::kOutOfMemory);
@@ -59,15 +57,6 @@ Result<Hull> ConvexHull::run(ImageView<const std::uint16_t> labels, const Rect& 
   return chain(points_.first(count));
 }
 
-Hull ConvexHull::merge(const Hull& a, const Hull& b) noexcept {
-  std::copy(a.begin(), a.end(), points_.begin());
-  std::copy(b.begin(), b.end(), points_.begin() + static_cast<std::ptrdiff_t>(a.size()));
-  const auto points = points_.first(a.size() + b.size());
-  std::sort(points.begin(), points.end(), before);
-  const auto end = std::unique(points.begin(), points.end());
-  return chain(points.first(static_cast<std::size_t>(end - points.begin())));
-}
-
 Hull ConvexHull::chain(std::span<const Point> sorted) noexcept {
   std::size_t n = 0;
   // Down the right side, then up the left one; a vertex that does not turn clockwise is inside.
@@ -82,7 +71,9 @@ Hull ConvexHull::chain(std::span<const Point> sorted) noexcept {
     vertices_[n++] = p;
   }
   if (n > 1) --n;  // the way up ends where the way down began
-  for (; n > static_cast<std::size_t>(config_.max_vertices); --n) drop_least(vertices_, n);
+  const auto room = static_cast<std::size_t>(config_.max_vertices);
+  if (n > room) ++reduced_;
+  for (; n > room; --n) drop_least(vertices_, n);
   Hull hull;
   for (std::size_t i = 0; i < n; ++i) {
     [[maybe_unused]] const bool fits = hull.push(vertices_[i]);  // n <= max_vertices <= capacity

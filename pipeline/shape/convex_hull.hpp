@@ -24,7 +24,8 @@ using Hull = FixedVector<Point, 48>;
 ///
 /// More vertices than max_vertices (a disc has about 3.4 r^(2/3): from r = 53 on): the vertex whose triangle
 /// with its neighbours is least goes, the first of equals, again and again. The result then no longer
-/// contains all pixels: at the rim of a disc of radius r up to 0.4 % of r are lost with 48 vertices.
+/// contains all pixels: at the rim of a disc of radius r up to 0.4 % of r are lost with 48 vertices. reduced() counts
+/// the hulls that this happened to.
 ///
 /// In: labels, width x height; the pixels in `box` (clipped) that have `label`. Out: hull, empty if there
 /// is none. Fault: kBadSize. O(box + vertices x vertices dropped). One instance a thread.
@@ -36,8 +37,9 @@ class ConvexHull {
 
   [[nodiscard]] static Result<ConvexHull> create(const Config& config, int width, int height, Arena& arena) noexcept;
   [[nodiscard]] Result<Hull> run(ImageView<const std::uint16_t> labels, const Rect& box, std::uint16_t label) noexcept;
-  /// Hull of two hulls, for blobs that are merged. O(vertices log vertices).
-  [[nodiscard]] Hull merge(const Hull& a, const Hull& b) noexcept;
+
+  /// Hulls that lost vertices for want of room, since create().
+  [[nodiscard]] std::uint64_t reduced() const noexcept { return reduced_; }
 
  private:
   [[nodiscard]] Hull chain(std::span<const Point> sorted) noexcept;
@@ -45,10 +47,11 @@ class ConvexHull {
   Config config_;
   int width_ = 0;
   int height_ = 0;
-  std::span<Point> points_;    // row extremes, or both hulls' vertices
+  std::span<Point> points_;  // row extremes
+  std::uint64_t reduced_ = 0;
   std::span<Point> vertices_;  // right side downwards, left side upwards
 };
-static_assert(RealTimeStage<ConvexHull, &ConvexHull::run, &ConvexHull::merge>);
+static_assert(RealTimeStage<ConvexHull, &ConvexHull::run>);
 
 /// Calls fn(y, begin, end) for each row of the picture that the hull covers, columns [begin, end): the
 /// pixels whose centres lie in the hull or on its edge, exactly. O(rows x vertices).

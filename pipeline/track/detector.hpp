@@ -115,6 +115,7 @@ class Detector {
 
   /// Rejected candidates of the last run.
   [[nodiscard]] const RejectionCounts& rejections() const noexcept { return rejections_; }
+  [[nodiscard]] std::uint64_t hulls_reduced() const noexcept { return hull_.reduced(); }  ///< see ConvexHull
 
  private:
   struct Layer {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <utility>
 
 #include "pictures.hpp"
 #include "pipeline/motion/adaptive_background.hpp"
@@ -180,6 +181,27 @@ TEST(ForegroundMask, PictureOfAnotherSizeIsAFaultAndLeavesTheMask) {
   EXPECT_EQ(cv::countNonZero(mask != 7), 0);
   EXPECT_EQ(stage->run(view(mask), view(distance)).error(), Fault::kBadSize);
   EXPECT_EQ(cv::countNonZero(distance != 255), 0);
+}
+
+// Two objects of 9 rows, one above the other: with room for the runs of the first, those of the second are counted.
+TEST(ForegroundMask, RunsWithoutRoomAreCountedAndTheLowerPartIsBackground) {
+  Plane distance = quiet();
+  const cv::Rect upper(20, 5, 12, 9);
+  const cv::Rect lower(20, 25, 12, 9);
+  distance(upper).setTo(12 * kStep);
+  distance(lower).setTo(12 * kStep);
+  for (const auto& [room, dropped] : {std::pair{18, 0}, std::pair{9, 9}}) {
+    ForegroundMask::Config c = config();
+    c.max_runs = room;
+    Arena arena;
+    auto stage = ForegroundMask::create(c, distance.cols, distance.rows, arena);
+    ASSERT_TRUE(stage.has_value());
+    Plane mask(distance.size(), std::uint8_t{7});
+    ASSERT_TRUE(stage->run(view(distance), view(mask)).has_value());
+    EXPECT_EQ(stage->dropped_runs(), dropped);
+    EXPECT_GT(cv::countNonZero(mask(upper)), 100);
+    EXPECT_EQ(cv::countNonZero(mask(lower)) == 0, dropped > 0);
+  }
 }
 
 TEST(ForegroundMask, Faults) {

@@ -137,22 +137,20 @@ TEST(ConvexHull, LeastTriangleGoesFirst) {
   EXPECT_EQ(list(hull_of(labels, 1, 4)), (std::vector<Point>{{0, 0}, {11, 1}, {11, 11}, {0, 11}}));
 }
 
-TEST(ConvexHull, MergedHullIsTheHullOfBothRegions) {
-  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    cv::RNG rng(seed);
-    cv::Mat_<std::uint16_t> labels(31, 43, std::uint16_t{0});
-    for (int i = 0; i < 20; ++i) {
-      labels(rng.uniform(0, 31), rng.uniform(0, 43)) = static_cast<std::uint16_t>(1 + i % 2);
-    }
-    const Hull first = hull_of(labels, 1);
-    const Hull second = hull_of(labels, 2);
-    labels.setTo(1, labels == 2);
-    Arena arena;
-    auto stage = ConvexHull::create({}, 43, 31, arena);
-    ASSERT_TRUE(stage.has_value());
-    EXPECT_EQ(list(stage->merge(first, second)), list(hull_of(labels)));
-    EXPECT_EQ(list(stage->merge(first, {})), list(first));
-    EXPECT_EQ(list(stage->merge(first, first)), list(first));
+TEST(ConvexHull, HullsThatLoseVerticesAreCounted) {
+  cv::Mat_<std::uint16_t> small = disc(20);
+  cv::Mat_<std::uint16_t> large = disc(150);
+  Arena arena;
+  auto stage = ConvexHull::create({}, large.cols, large.rows, arena);
+  ASSERT_TRUE(stage.has_value());
+  cv::Mat_<std::uint16_t> labels(large.size(), std::uint16_t{0});
+  small.copyTo(labels(cv::Rect(0, 0, small.cols, small.rows)));
+  const Rect all{0, 0, labels.cols, labels.rows};
+  ASSERT_TRUE(stage->run(const_view(labels), all, 1).has_value());
+  EXPECT_EQ(stage->reduced(), 0U);
+  for (const std::uint64_t times : {1U, 2U}) {
+    ASSERT_TRUE(stage->run(const_view(large), all, 1).has_value());
+    EXPECT_EQ(stage->reduced(), times);
   }
 }
 
