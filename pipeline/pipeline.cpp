@@ -23,10 +23,6 @@ constexpr int kShadowRestPercent = 25;
 // least kEvidencePercent of its pixels.
 constexpr int kVerdictPercent = 70;
 constexpr int kEvidencePercent = 30;
-// The background's disparity is renewed this much slower once it is complete.
-constexpr int kLaterPasses = 10;
-constexpr int kWidestGap = 64;        // [px]
-constexpr int kWidestColumnGap = 16;  // [px]
 // A region's match counts if the second best place is at least this much worse.
 constexpr double kUnique = 1.5;
 constexpr double kLeastCost = 9;    // of a region's match, by noise alone [grey levels squared]
@@ -59,26 +55,6 @@ void fill(ImageView<std::uint8_t> picture, std::uint8_t value) noexcept {
 template <class T>
 void fill(ImageView<T> picture, const Rect& part, T value) noexcept {
   for (int y = part.top; y < part.bottom(); ++y) std::fill_n(picture.row(y) + part.left, part.width, value);
-}
-
-// Short stretches of a row or column (`step` apart) without disparity, between ends that agree, take the straight line
-// between them: a background is mostly made of planes.
-void bridge_gaps(std::uint16_t* first, std::ptrdiff_t step, int count, int widest) noexcept {
-  int last = -1;
-  for (int i = 0; i < count; ++i) {
-    if (first[i * step] == kNoDisparity) continue;
-    const int gap = i - last;
-    if (last >= 0 && gap > 1 && gap <= widest) {
-      const int from = first[last * step];
-      const int to = first[i * step];
-      if (std::abs(to - from) <= std::max(2 * kDisparityScale, from / 10)) {
-        for (int k = last + 1; k < i; ++k) {
-          first[k * step] = static_cast<std::uint16_t>(from + (to - from) * (k - last) / gap);
-        }
-      }
-    }
-    last = i;
-  }
 }
 
 // Takes what create() of a stage gave; remembers the first fault.
@@ -202,33 +178,11 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
   const RectifiedGeometry& canvas = rectifier_->geometry();
   const DisparityConfig& disparity = config_.disparity;
   full_range_ = std::max(static_cast<int>(disparity.reach * width + 0.5), disparity.max);
-  const DisparityRange dense{0, disparity.max};
-  if (disparity.method == MatchMethod::kSad) {
-    if (!keep(sad_,
-              SadMatcher::create({.width = canvas.width_left,
-                                  .height = canvas.height,
-                                  .right_width = canvas.width_right,
-                                  .offset = canvas.offset,
-                                  .block = disparity.block,
-                                  .range = dense,
-                                  .region_disparities = full_range_ + 1},
-                                 arena),
-              outcome)) {
-      return outcome;
-    }
-  } else if (!keep(census_,
-                   CensusMatcher::create({.width = canvas.width_left,
-                                          .height = canvas.height,
-                                          .right_width = canvas.width_right,
-                                          .offset = canvas.offset,
-                                          .block = disparity.block,
-                                          .range = dense,
-                                          .region_disparities = full_range_ + 1,
-                                          .filter = {.fill_px = 0}},
-                                         arena),
-                   outcome)) {
-    return outcome;
-  }
+  const BlockMatcher::Config blocks{.method = disparity.method,
+                                    .block = disparity.block,
+                                    .max = disparity.max,
+                                    .region_disparities = full_range_ + 1};
+  if (!keep(matcher_, BlockMatcher::create(blocks, canvas, arena), outcome)) return outcome;
   memory_.charge(MemoryPart::kMatcher, arena);
   if (!keep(region_matcher_,
             RegionMatcher::create({.width = canvas.width_left,
@@ -241,6 +195,10 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
     return outcome;
   }
   memory_.charge(MemoryPart::kRegions, arena);
+  const auto canvases = [&]() -> CanvasPair {
+    return {LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena),
+            LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena)};
+  };
   const bool adaptive = config_.background.method == ForegroundMethod::kAdaptive;
   if (adaptive) {
     AdaptiveBackground::Config background = config_.background.adaptive;
@@ -253,16 +211,17 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
       return outcome;
     }
     memory_.charge(MemoryPart::kForeground, arena);
-    left_.background_canvas = LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena);
-    right_.background_canvas = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena);
+    background_canvases_ = canvases();
     right_moving_ = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kNearest, arena);
   }
-  left_.canvas = LazyCanvas::create(rectifier_->table(View::kLeft), Sampling::kBilinear, arena);
-  right_.canvas = LazyCanvas::create(rectifier_->table(View::kRight), Sampling::kBilinear, arena);
+  canvases_ = canvases();
   memory_.charge(MemoryPart::kCanvases, arena);
   if (adaptive) {
-    canvas_background_ = arena.image<std::uint16_t>(canvas.width_left, canvas.height);
-    if (!canvas_background_.empty()) fill(canvas_background_, {0, 0, canvas.width_left, canvas.height}, kNoDisparity);
+    if (!keep(background_disparity_,
+              BackgroundDisparity::create({.frames = config_.background.frames}, rectifier_->mask(View::kLeft), arena),
+              outcome)) {
+      return outcome;
+    }
     old_disparity_ = arena.image<std::uint16_t>(width, height);
   }
   wanted_ = arena.image<std::uint8_t>(canvas.width_left, canvas.height);
@@ -344,8 +303,8 @@ void Pipeline::ingest(const FramePair& pair) noexcept {
   }
   if (!rectifier_) return;
   if (background_right_) smooth3x3(right_.y, right_.smooth_y);
-  left_.canvas.show(left_.y);
-  right_.canvas.show(right_.y);
+  canvases_.left.show(left_.y);
+  canvases_.right.show(right_.y);
 }
 
 AdaptiveBackground::Planes Pipeline::left_planes() const noexcept {
@@ -353,6 +312,7 @@ AdaptiveBackground::Planes Pipeline::left_planes() const noexcept {
 }
 
 void Pipeline::find_foreground() noexcept {
+  if (frames_ <= config_.background.frames) ++frames_;  // no further: a rig runs for years
   if (config_.background.method == ForegroundMethod::kEdges) {
     foreground_from_edges();
   } else {
@@ -373,7 +333,6 @@ void Pipeline::find_blobs(ImageView<const std::uint8_t> mask) noexcept {
 }
 
 void Pipeline::foreground_from_edges() noexcept {
-  ++frames_;
   mean_y_->learn(left_.y);
   if (setup_.colour) {
     mean_cb_->learn(left_.cb);
@@ -394,15 +353,16 @@ void Pipeline::foreground_from_model() noexcept {
   if (light_change_) fill(moving_, 0);
   (void)closing_->run(moving_, scratch_);
   (void)contour_fill_->run(scratch_, left_.mask);
-  ++frames_;
   if (!rectifier_) return;
   background_right_->distance({right_.smooth_y, {}, {}}, right_.distance);
   (void)foreground_right_->run(right_.distance, right_.mask);
   count_no_room(foreground_right_->dropped_runs());
   right_moving_.show(right_.mask);
-  left_.background_canvas.show(background_left_->luma());
-  right_.background_canvas.show(background_right_->luma());
-  if (frames_ > 1 && config_.shadow.method == ShadowMethod::kStereo) renew_background_disparity();
+  background_canvases_.left.show(background_left_->luma());
+  background_canvases_.right.show(background_right_->luma());
+  if (frames_ > 1 && config_.shadow.method == ShadowMethod::kStereo) {
+    background_disparity_->renew(background_canvases_, *matcher_, {0, full_range_});
+  }
 }
 
 void Pipeline::refine_blobs() noexcept {
@@ -434,88 +394,19 @@ DisparityRange Pipeline::range_for(const Blob& blob) const noexcept {
   return {std::max(static_cast<int>(low), 0), std::min(static_cast<int>(high) + 1, full_range_)};
 }
 
-// The part of the canvas in which a box of the raw left picture lies.
-Rect Pipeline::on_canvas(const Rect& box) const noexcept {
-  const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
-  double left = 1e9;
-  double top = 1e9;
-  double right = -1e9;
-  double bottom = -1e9;
-  const auto reach = [&](int x, int y) {
-    const Rectifier::PointF p = place.at(x, y);
-    if (!p.valid()) return;
-    left = std::min<double>(left, p.x);
-    right = std::max<double>(right, p.x);
-    top = std::min<double>(top, p.y);
-    bottom = std::max<double>(bottom, p.y);
-  };
-  for (int x = box.left; x < box.right(); ++x) {
-    reach(x, box.top);
-    reach(x, box.bottom() - 1);
-  }
-  for (int y = box.top; y < box.bottom(); ++y) {
-    reach(box.left, y);
-    reach(box.right() - 1, y);
-  }
-  if (right < left) return {};
-  const int u = static_cast<int>(std::floor(left)) - 1;
-  const int v = static_cast<int>(std::floor(top)) - 1;
-  return intersect({u, v, static_cast<int>(std::ceil(right)) + 2 - u, static_cast<int>(std::ceil(bottom)) + 2 - v},
-                   {0, 0, wanted_.width, wanted_.height});
-}
-
-// What of the right canvas the candidates of a part of the left one reach.
-Rect Pipeline::partners_of(const Rect& part, DisparityRange range) const noexcept {
-  return {part.left - rectifier_->geometry().offset - range.max, part.top, part.width + range.max - range.min,
-          part.height};
-}
-
-void Pipeline::run_matcher(LazyCanvas& left, LazyCanvas& right, const Rect& roi, DisparityRange range,
-                           ImageView<std::uint16_t> out) noexcept {
-  const Rect seen = grown(roi, config_.disparity.block / 2 + CensusMatcher::kReach);
-  const ImageView<const std::uint8_t> left_picture = left.with(seen);
-  const ImageView<const std::uint8_t> right_picture = right.with(partners_of(seen, range));
-  if (sad_) {
-    (void)sad_->run_region(left_picture, right_picture, roi, wanted_, range, out);
-  } else {
-    (void)census_->run_region(left_picture, right_picture, roi, wanted_, range, out);
-  }
-}
-
 // The region that region_matcher_ has taken, inside roi; right_moving may be an empty canvas. found: false where
 // matching failed.
-RegionMatch Pipeline::match_region(LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving, const Rect& roi,
+RegionMatch Pipeline::match_region(CanvasPair& pair, LazyCanvas& right_moving, const Rect& roi,
                                    const RegionMatcher::Search& search) noexcept {
-  const Rect partners = grown(partners_of(roi, search.range), region_matcher_->config().row_tolerance);
+  const Rect partners =
+      grown(partners_of(roi, search.range, rectifier_->geometry().offset), region_matcher_->config().row_tolerance);
   const Result<RegionMatch> found =
-      region_matcher_->match_taken(left.with(roi), right.with(partners), search, right_moving.with(partners));
+      region_matcher_->match_taken(pair.left.with(roi), pair.right.with(partners), search, right_moving.with(partners));
   return found.has_value() ? *found : RegionMatch{};
 }
 
-// The background hardly changes and matching all of it costs much, so each frame renews a strip of rows: the whole
-// picture once while the background is learnt, then again and again, ten times slower.
-void Pipeline::renew_background_disparity() noexcept {
-  const int height = canvas_background_.height;
-  const int pass = std::max(config_.background.frames, 1) * (renewed_rows_ < height ? 1 : kLaterPasses);
-  const int rows = std::min((height + pass - 1) / pass, height);
-  const int top = renewed_rows_ % height;
-  const Rect strip{0, top, canvas_background_.width, std::min(rows, height - top)};
-  for (int y = strip.top; y < strip.bottom(); ++y) {
-    std::copy_n(rectifier_->mask(View::kLeft).row(y), strip.width, wanted_.row(y));
-  }
-  fill(canvas_background_, strip, kNoDisparity);
-  run_matcher(left_.background_canvas, right_.background_canvas, strip, {0, full_range_}, canvas_background_);
-  for (int y = strip.top; y < strip.bottom(); ++y) bridge_gaps(canvas_background_.row(y), 1, strip.width, kWidestGap);
-  // A line along the rows has no disparity of its own: it is bridged along the columns.
-  const int from = std::max(strip.top - kWidestColumnGap, 0);
-  for (int x = 0; x < strip.width; ++x) {
-    bridge_gaps(&canvas_background_.at(x, from), canvas_background_.stride, strip.bottom() - from, kWidestColumnGap);
-  }
-  renewed_rows_ += strip.height;
-}
-
 void Pipeline::match_blob(const Blob& blob) noexcept {
-  const Rect roi = on_canvas(blob.box);
+  const Rect roi = rectifier_->on_left_canvas(blob.box);
   if (roi.empty()) return;
   if (config_.disparity.mode == DisparityMode::kRegions) {
     const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
@@ -527,7 +418,7 @@ void Pipeline::match_blob(const Blob& blob) noexcept {
       }
     }
     fill(canvas_disparity_, roi, kNoDisparity);
-    run_matcher(left_.canvas, right_.canvas, roi, range_for(blob), canvas_disparity_);
+    (void)matcher_->run_region(canvases_, roi, wanted_, range_for(blob), canvas_disparity_);
   }
   const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
   for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
@@ -536,20 +427,12 @@ void Pipeline::match_blob(const Blob& blob) noexcept {
     const int v = p.valid() ? nearest(p.y) : -1;
     const bool known = canvas_disparity_.contains(u, v);
     disparity_.at(x, y) = known ? canvas_disparity_.at(u, v) : kNoDisparity;
-    if (background_right_) old_disparity_.at(x, y) = known ? canvas_background_.at(u, v) : kNoDisparity;
+    if (background_right_) old_disparity_.at(x, y) = known ? background_disparity_->map().at(u, v) : kNoDisparity;
   });
 }
 
-void Pipeline::match_dense() noexcept {
-  if (sad_) {
-    (void)sad_->run(left_.canvas.whole(), right_.canvas.whole(), canvas_disparity_);
-  } else {
-    (void)census_->run(left_.canvas.whole(), right_.canvas.whole(), canvas_disparity_);
-  }
-}
-
 void Pipeline::find_disparity() noexcept {
-  if (config_.disparity.mode == DisparityMode::kDense) match_dense();
+  if (config_.disparity.mode == DisparityMode::kDense) (void)matcher_->run(canvases_, canvas_disparity_);
   for (const Blob& blob : blobs_.blobs) {
     if (blob.area > 0) match_blob(blob);
   }
@@ -703,7 +586,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
   const bool small = candidate.area <= config_.disparity.small_px;
   const bool judges_surface = background_right_ && config_.shadow.method == ShadowMethod::kStereo;
   if (!sparse && !small && !judges_surface) return;
-  const Rect roi = on_canvas(candidate.box);
+  const Rect roi = rectifier_->on_left_canvas(candidate.box);
   if (roi.empty()) return;
   LazyCanvas nowhere;
   DisparityRange range{0, full_range_};
@@ -716,7 +599,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
     }
   }
   bool taken = false;
-  const auto match = [&](LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving) {
+  const auto match = [&](CanvasPair& pair, LazyCanvas& right_moving) {
     if (!taken) {
       const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
       region_matcher_->take(roi, [&](int x, int y) {
@@ -725,7 +608,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
       });
       taken = true;
     }
-    return match_region(left, right, right_moving, roi, {.range = range, .enough_uniqueness = kUnique});
+    return match_region(pair, right_moving, roi, {.range = range, .enough_uniqueness = kUnique});
   };
   // Without a picture of what moves on the right, all of the region is said to fall on it.
   const auto sure = [](const RegionMatch& found) {
@@ -733,7 +616,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
   };
   double cost = RegionMatcher::kAnyCost;
   if (sparse || small) {
-    const RegionMatch now = match(left_.canvas, right_.canvas, right_moving_);
+    const RegionMatch now = match(canvases_, right_moving_);
     if (now.found) cost = now.look;  // fits_at() does not ask where it moves
     // What little is known pixel by pixel is better than a vague guess at the whole of a large region.
     const bool vague = now.sigma_px > std::max(kSurePart * now.disparity_px, 1.0);
@@ -769,7 +652,7 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
     const bool near = candidate.disparity - before <= limit;
     candidate.own_surface = (near || (small && fits_at(before, roi, cost))) && resembles();
   } else if (resembles()) {
-    const RegionMatch whole = match(left_.background_canvas, right_.background_canvas, nowhere);
+    const RegionMatch whole = match(background_canvases_, nowhere);
     if (!sure(whole)) return;
     const double before = whole.disparity_px;
     candidate.own_surface = candidate.disparity - before <= limit || (small && fits_at(before, roi, cost));
@@ -782,9 +665,7 @@ bool Pipeline::fits_at(double disparity, const Rect& roi, double cost) noexcept 
   const int middle = static_cast<int>(disparity + 0.5);
   const DisparityRange near{std::max(middle - 1, 0), std::min(middle + 1, full_range_)};
   LazyCanvas nowhere;
-  const auto match = [&](const RegionMatcher::Search& search) {
-    return match_region(left_.canvas, right_.canvas, nowhere, roi, search);
-  };
+  const auto match = [&](const RegionMatcher::Search& search) { return match_region(canvases_, nowhere, roi, search); };
   const RegionMatch here =
       match({.range = near, .most_cost = kUnique * std::max(cost, kLeastCost), .enough_uniqueness = 1});
   if (!here.found) return false;
@@ -802,8 +683,7 @@ void Pipeline::learn_background() noexcept {
   if (light_change_) {
     background_left_->restart();
     if (background_right_) background_right_->restart();
-    renewed_rows_ = 0;
-    if (rectifier_) fill(canvas_background_, {0, 0, canvas_background_.width, canvas_background_.height}, kNoDisparity);
+    if (background_disparity_) background_disparity_->restart();
   }
   background_left_->learn(left_planes(), moving_);
   if (background_right_) background_right_->learn({right_.smooth_y, {}, {}}, right_.mask);

@@ -19,8 +19,9 @@
 #include "pipeline/shape/contour_fill.hpp"
 #include "pipeline/shape/morphology.hpp"
 #include "pipeline/shape/sobel.hpp"
+#include "pipeline/stereo/background_disparity.hpp"
+#include "pipeline/stereo/block_matcher.hpp"
 #include "pipeline/stereo/region_matcher.hpp"
-#include "pipeline/stereo/sad_matcher.hpp"
 #include "pipeline/track/track_report.hpp"
 
 namespace stereotrack {
@@ -97,8 +98,6 @@ class Pipeline {
     ImageView<std::uint8_t> smooth_cr;
     ImageView<std::uint8_t> distance;
     ImageView<std::uint8_t> mask;
-    LazyCanvas canvas;             ///< luma, rectified
-    LazyCanvas background_canvas;  ///< background's luma, rectified
   };
 
   explicit Pipeline(const PipelineConfig& config, const Setup& setup) noexcept : config_(config), setup_(setup) {}
@@ -116,9 +115,7 @@ class Pipeline {
   void foreground_from_edges() noexcept;
   void foreground_from_model() noexcept;
   void find_disparity() noexcept;
-  void match_dense() noexcept;
   void match_blob(const Blob& blob) noexcept;
-  void renew_background_disparity() noexcept;
   [[nodiscard]] bool is_explained(const Blob& blob) const noexcept;
   void reject_background() noexcept;
   void measure_strength() noexcept;
@@ -132,11 +129,7 @@ class Pipeline {
   void learn_background() noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
   [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;
-  [[nodiscard]] Rect on_canvas(const Rect& box) const noexcept;
-  [[nodiscard]] Rect partners_of(const Rect& part, DisparityRange range) const noexcept;
-  void run_matcher(LazyCanvas& left, LazyCanvas& right, const Rect& roi, DisparityRange range,
-                   ImageView<std::uint16_t> out) noexcept;
-  [[nodiscard]] RegionMatch match_region(LazyCanvas& left, LazyCanvas& right, LazyCanvas& right_moving, const Rect& roi,
+  [[nodiscard]] RegionMatch match_region(CanvasPair& pair, LazyCanvas& right_moving, const Rect& roi,
                                          const RegionMatcher::Search& search) noexcept;
 
   PipelineConfig config_;
@@ -144,7 +137,7 @@ class Pipeline {
   MemoryUse memory_;
   bool started_ = false;
   bool light_change_ = false;
-  int frames_ = 0;
+  int frames_ = 0;  ///< seen, counted to one more than background.frames
   int full_range_ = 0;
   CaptureTime last_time_{};
   double dt_ = 0;  ///< since the frame before [s]
@@ -162,9 +155,9 @@ class Pipeline {
   ImageView<std::uint16_t> old_disparity_;  ///< the background's, raw left picture
   ImageView<std::uint8_t> wanted_;          ///< canvas: pixels to be matched
   ImageView<std::uint16_t> canvas_disparity_;
-  ImageView<std::uint16_t> canvas_background_;  ///< background's disparity, renewed a strip of rows a frame
-  int renewed_rows_ = 0;                        ///< of canvas_background_, since the background began
-  LazyCanvas right_moving_;                     ///< right canvas: foreground of the right view
+  CanvasPair canvases_;             ///< luma
+  CanvasPair background_canvases_;  ///< the backgrounds' luma
+  LazyCanvas right_moving_;         ///< right canvas: foreground of the right view
 
   Equalise equalise_left_{{}};
   Equalise equalise_right_{{}};
@@ -185,8 +178,8 @@ class Pipeline {
   std::optional<ShadowTest> shadow_test_;
   std::optional<UmbraTest> umbra_test_;
   std::optional<Rectifier> rectifier_;
-  std::optional<SadMatcher> sad_;
-  std::optional<CensusMatcher> census_;
+  std::optional<BlockMatcher> matcher_;
+  std::optional<BackgroundDisparity> background_disparity_;
   std::optional<RegionMatcher> region_matcher_;
   std::optional<Detector> detector_;
   std::optional<Tracker> tracker_;

@@ -7,7 +7,7 @@
 #include "pipeline/motion/shadow_test.hpp"
 #include "pipeline/photometry/equalise.hpp"
 #include "pipeline/shape/level_set.hpp"
-#include "pipeline/stereo/census_matcher.hpp"
+#include "pipeline/stereo/block_matcher.hpp"
 #include "pipeline/track/detector.hpp"
 #include "pipeline/track/features.hpp"
 #include "pipeline/track/tracker.hpp"
@@ -23,11 +23,6 @@ enum class ShadowMethod : std::uint8_t {
   kOff,
   kChroma,  ///< the document's sigma test of Cb and Cr, alone
   kStereo,  ///< disparity of the background first, then appearance
-};
-
-enum class MatchMethod : std::uint8_t {
-  kSad,     ///< the document's block matching
-  kCensus,  ///< census, left-right check, sub-pixel
 };
 
 enum class DisparityMode : std::uint8_t {

@@ -286,6 +286,34 @@ void Rectifier::rectify(ImageView<const std::uint8_t> raw, View view, ImageView<
   for (int v = 0; v < out.height; ++v) remap_row(raw, table, v, sampling, out.row(v));
 }
 
+Rect Rectifier::on_left_canvas(const Rect& raw) const noexcept {
+  double left = 1e9;
+  double top = 1e9;
+  double right = -1e9;
+  double bottom = -1e9;
+  const auto reach = [&](int x, int y) {
+    const PointF p = rectified_from_raw_.at(x, y);
+    if (!p.valid()) return;
+    left = std::min<double>(left, p.x);
+    right = std::max<double>(right, p.x);
+    top = std::min<double>(top, p.y);
+    bottom = std::max<double>(bottom, p.y);
+  };
+  for (int x = raw.left; x < raw.right(); ++x) {
+    reach(x, raw.top);
+    reach(x, raw.bottom() - 1);
+  }
+  for (int y = raw.top; y < raw.bottom(); ++y) {
+    reach(raw.left, y);
+    reach(raw.right() - 1, y);
+  }
+  if (right < left) return {};
+  const int u = static_cast<int>(std::floor(left)) - 1;
+  const int v = static_cast<int>(std::floor(top)) - 1;
+  return intersect({u, v, static_cast<int>(std::ceil(right)) + 2 - u, static_cast<int>(std::ceil(bottom)) + 2 - v},
+                   {0, 0, plan_.geometry.width_left, plan_.geometry.height});
+}
+
 std::optional<Eigen::Vector2d> Rectifier::rectified_from_raw(double x, double y) const noexcept {
   const std::optional<Eigen::Vector2d> p = plan_.left.unproject({x, y});
   if (!p) return std::nullopt;

@@ -7,6 +7,7 @@
 
 #include "pipeline/core/arena.hpp"
 #include "pipeline/core/image_view.hpp"
+#include "pipeline/core/rect.hpp"
 #include "pipeline/core/result.hpp"
 #include "pipeline/core/stage.hpp"
 #include "pipeline/geometry/calibration.hpp"
@@ -108,7 +109,11 @@ class Rectifier {
   /// Left raw pixel -> place on the left canvas, within 1e-4 px: a table of raw size.
   [[nodiscard]] ImageView<const PointF> rectified_from_raw() const noexcept { return rectified_from_raw_; }
 
-  /// The same for any place of the left raw picture, to 1e-8 px, computed: about 0.15 us. Nothing where the
+  /// The part of the left canvas in which a box of the left raw picture lies, by its rim, a pixel around it; clipped.
+  /// Empty where the canvas shows nothing of the rim. O(rim).
+  [[nodiscard]] Rect on_left_canvas(const Rect& raw) const noexcept;
+
+  /// rectified_from_raw() for any place of the left raw picture, to 1e-8 px, computed: about 0.15 us. Nothing where the
   /// lens equation has no ray.
   [[nodiscard]] std::optional<Eigen::Vector2d> rectified_from_raw(double x, double y) const noexcept;
 
@@ -134,6 +139,6 @@ class Rectifier {
   Map right_;
   ImageView<PointF> rectified_from_raw_;
 };
-static_assert(RealTimeStage<Rectifier, &Rectifier::rectify, &Rectifier::raw_from_ray>);
+static_assert(RealTimeStage<Rectifier, &Rectifier::rectify, &Rectifier::on_left_canvas, &Rectifier::raw_from_ray>);
 
 }  // namespace stereotrack

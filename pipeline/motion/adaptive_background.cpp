@@ -66,7 +66,7 @@ int AdaptiveBackground::estimate_gain(ImageView<const std::uint8_t> y) const noe
 void AdaptiveBackground::distance(const Planes& picture, ImageView<std::uint8_t> out) noexcept {
   const int width = out.width;
   const int height = out.height;
-  if (seen_ == 0) {
+  if (!started_) {
     for (int y = 0; y < height; ++y) std::fill_n(out.row(y), width, std::uint8_t{0});
     return;
   }
@@ -98,7 +98,7 @@ void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8
   };
   std::uint64_t changed = 0;
   for (int y = 0; y < age_.height; ++y) {
-    if (seen_ > 0 && y % kGainStep == 0) std::copy_n(mask.row(y), age_.width, foreground_.row(y / kGainStep));
+    if (started_ && y % kGainStep == 0) std::copy_n(mask.row(y), age_.width, foreground_.row(y / kGainStep));
     LearnRow row{.channels = {channel(picture.y, y_, y)},
                  .count = colour_ ? 3 : 1,
                  .age = age_.row(y),
@@ -110,7 +110,7 @@ void AdaptiveBackground::learn(const Planes& picture, ImageView<const std::uint8
     }
     changed += static_cast<std::uint64_t>(learn_row(row, rates, age_.width));
   }
-  ++seen_;
+  started_ = true;
   const auto pixels = static_cast<std::uint64_t>(age_.width) * static_cast<std::uint64_t>(age_.height);
   if (changed * 100 > pixels * static_cast<std::uint64_t>(config_.relearn_percent)) restart();
 }

@@ -83,7 +83,8 @@ class AdaptiveBackground {
   [[nodiscard]] ImageView<const std::uint8_t> red() const noexcept { return cr_.shown; }
   /// Gain of the light against the background, 256 = unchanged.
   [[nodiscard]] int gain() const noexcept { return gain_; }
-  [[nodiscard]] int seen() const noexcept { return seen_; }
+  /// Whether learn() has been called.
+  [[nodiscard]] bool started() const noexcept { return started_; }
 
  private:
   struct Channel {
@@ -97,7 +98,7 @@ class AdaptiveBackground {
 
   Config config_;
   bool colour_ = false;
-  int seen_ = 0;
+  bool started_ = false;
   int gain_ = 256;
   Channel y_;
   Channel cb_;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
@@ -254,6 +255,46 @@ TEST(Rectify, RectifiedRigGetsTheIdentity) {
     }
   }
   EXPECT_NEAR(rectifier->rectified_from_raw().at(17, 5).x, 17.0F, 1e-4F);
+}
+
+TEST(Rectify, BoxOfTheRawPictureLiesOnItsPartOfTheCanvas) {
+  Arena arena;
+  const auto made = Rectifier::create(rig(), kWidth, kHeight, arena);
+  ASSERT_TRUE(made.has_value());
+  const RectifiedGeometry& g = made->geometry();
+  for (const Rect& box :
+       {Rect{70, 50, 20, 15}, Rect{0, 0, kWidth, kHeight}, Rect{150, 0, 10, 12}, Rect{9, 100, 1, 1}}) {
+    const Rect part = made->on_left_canvas(box);
+    // Each pixel of the box falls into the part, and the part is no wider than that needs: the rim reaches its sides.
+    double left = 1e9;
+    double right = -1e9;
+    for (int y = box.top; y < box.bottom(); ++y) {
+      for (int x = box.left; x < box.right(); ++x) {
+        const Rectifier::PointF p = made->rectified_from_raw().at(x, y);
+        const double u = p.x;
+        const double v = p.y;
+        if (!p.valid() || u < 0 || v < 0 || u > g.width_left - 1 || v > g.height - 1) continue;
+        EXPECT_TRUE(u >= part.left && u <= part.right() - 1 && v >= part.top && v <= part.bottom() - 1);
+        left = std::min(left, u);
+        right = std::max(right, u);
+      }
+    }
+    EXPECT_LE(left - part.left, 2.0);
+    EXPECT_LE(part.right() - 1 - right, 2.0);
+  }
+}
+
+TEST(Rectify, BoxOfARectifiedRigIsGrownByAPixelAndClipped) {
+  Arena arena;
+  const auto made = Rectifier::create(rectified_rig(), kWidth, kHeight, arena);
+  ASSERT_TRUE(made.has_value());
+  const auto sides = [&](const Rect& box) {
+    const Rect part = made->on_left_canvas(box);
+    return std::array{part.left, part.top, part.right(), part.bottom()};
+  };
+  EXPECT_EQ(sides({20, 30, 11, 5}), (std::array{19, 29, 32, 36}));
+  EXPECT_EQ(sides({0, 0, kWidth, kHeight}), (std::array{0, 0, kWidth, kHeight}));
+  EXPECT_TRUE(made->on_left_canvas({}).empty());
 }
 
 TEST(Rectify, CanvasNeverExceedsOneAndAHalfTimesThePicture) {

@@ -86,7 +86,7 @@ TEST(AdaptiveBackground, DistanceIsZeroBeforeTheFirstPictureIsLearnt) {
   watch.distance.setTo(99);
   watch.look(surface(kSize, 110));
   EXPECT_EQ(cv::countNonZero(watch.distance), 0);
-  EXPECT_EQ(watch.background->seen(), 0);
+  EXPECT_FALSE(watch.background->started());
 }
 
 TEST(AdaptiveBackground, DetectsFromTheSecondFrame) {
