@@ -1,0 +1,104 @@
+#include "firmware-app/runtime/real_time.hpp"
+
+#include <fcntl.h>
+#include <malloc.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace stereotrack::runtime {
+
+namespace {
+
+std::string reason(int error) { return std::strerror(error); }
+
+// Writes to each page of the stack below the caller, so that none faults later. Locked memory would be present anyhow;
+// without the right to lock it this is what can be done.
+[[gnu::noinline]] void touch_stack() noexcept {
+  constexpr std::size_t kLeft = 64 * 1024;  // for what is on the stack already, and the guard page
+  volatile char stack[Thread::kStackBytes - kLeft];
+  for (std::size_t i = 0; i < sizeof stack; i += 4096) stack[i] = 0;
+}
+
+}  // namespace
+
+RealTimeProcess::RealTimeProcess(const Config& config) {
+  (void)mallopt(M_TRIM_THRESHOLD, -1);
+  (void)mallopt(M_MMAP_MAX, 0);
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+    missing_.push_back({"memory cannot be locked: " + reason(errno),
+                        "LimitMEMLOCK=infinity in the unit, or `ulimit -l unlimited`, or CAP_IPC_LOCK"});
+  }
+  if (config.deep_sleep) return;
+  latency_fd_ = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
+  const std::int32_t most_us = 0;
+  if (latency_fd_ < 0 || write(latency_fd_, &most_us, sizeof most_us) != sizeof most_us) {
+    missing_.push_back({"/dev/cpu_dma_latency: " + reason(errno) + ": cores may sleep deeply and wake late",
+                        "the udev rule that gives the device to the service's group, or realtime.deep_sleep = true"});
+  }
+}
+
+RealTimeProcess::~RealTimeProcess() {
+  if (latency_fd_ >= 0) (void)close(latency_fd_);
+  (void)munlockall();
+}
+
+Thread::Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> body)
+    : plan_(plan), mode_(mode), body_(std::move(body)) {
+  plan_.name.resize(std::min<std::size_t>(plan_.name.size(), 15));
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) throw std::runtime_error("thread " + plan.name + ": out of memory");
+  (void)pthread_attr_setstacksize(&attributes, kStackBytes);
+  const int made = pthread_create(&thread_, &attributes, &Thread::run, this);
+  (void)pthread_attr_destroy(&attributes);
+  if (made != 0) throw std::runtime_error("thread " + plan.name + ": " + reason(made));
+  // From here, not from inside: who starts it must know what is missing before it goes on.
+  (void)pthread_setname_np(thread_, plan_.name.c_str());
+  if (mode_ == RealTimeMode::kOff) return;
+  if (plan_.core >= 0) {
+    cpu_set_t cores;
+    CPU_ZERO(&cores);
+    const bool known = plan_.core < CPU_SETSIZE;
+    if (known) CPU_SET(static_cast<unsigned>(plan_.core), &cores);
+    const int set = known ? pthread_setaffinity_np(thread_, sizeof cores, &cores) : EINVAL;
+    if (set != 0) {
+      missing_.push_back({"thread " + plan_.name + ": core " + std::to_string(plan_.core) + ": " + reason(set),
+                          "a core that this machine has and the unit's CPUAffinity= allows, or -1 for any"});
+    }
+  }
+  if (plan_.priority > 0) {
+    sched_param parameters{};
+    parameters.sched_priority = plan_.priority;
+    const int set = pthread_setschedparam(thread_, SCHED_FIFO, &parameters);
+    if (set != 0) {
+      missing_.push_back(
+          {"thread " + plan_.name + ": real-time priority " + std::to_string(plan_.priority) + ": " + reason(set),
+           "LimitRTPRIO=" + std::to_string(plan_.priority) + " in the unit, or `ulimit -r`, or CAP_SYS_NICE"});
+    }
+  }
+}
+
+void Thread::join() noexcept {
+  if (joined_) return;
+  joined_ = true;
+  (void)pthread_join(thread_, nullptr);
+}
+
+void* Thread::run(void* self) noexcept {
+  Thread& thread = *static_cast<Thread*>(self);
+  if (thread.mode_ != RealTimeMode::kOff) {
+    touch_stack();
+    (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
+  }
+  thread.body_();
+  return nullptr;
+}
+
+}  // namespace stereotrack::runtime
