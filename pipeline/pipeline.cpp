@@ -85,8 +85,6 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   };
   planes(self.left_, setup.colour);
   self.scratch_ = arena.image<std::uint8_t>(setup.width, setup.height);
-  self.typical_distance_ = arena.array<std::uint8_t>(static_cast<std::size_t>(config.shape.max_blobs) + 1);
-  self.ghost_ = arena.array<std::uint8_t>(static_cast<std::size_t>(config.shape.max_blobs) + 1);
   self.moving_ = arena.image<std::uint8_t>(setup.width, setup.height);
   if (setup.calibration != nullptr) planes(self.right_, false);
   self.memory_.charge(MemoryPart::kPlanes, arena);
@@ -152,7 +150,8 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
     return outcome;
   }
   memory_.charge(MemoryPart::kShapes, arena);
-  if (!keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, arena), outcome)) return outcome;
+  if (!keep(shadow_test_, ShadowTest::create(config_.shadow.test, width, height, shape.max_blobs, arena), outcome))
+    return outcome;
   if (config_.shadow.method == ShadowMethod::kStereo && config_.shadow.deep && setup_.calibration == nullptr &&
       !edges &&
       !keep(umbra_test_,
@@ -447,59 +446,8 @@ ShadowTest::Input Pipeline::shadow_input() const noexcept {
           .cr_background = background_left_->red(),
           .distance = left_.distance,
           .labels = blobs_.labels,
-          .typical = typical_distance_,
-          .ghost = ghost_,
           .disparity = disparity_,
           .disparity_background = old_disparity_};
-}
-
-// Where the region's disparity lies from the background's own; what ShadowTest::weigh() says of each pixel.
-ShadowTest::Evidence Pipeline::evidence_of(const Blob& blob) const noexcept {
-  ShadowTest::Evidence sum;
-  if (disparity_.empty() || old_disparity_.empty()) {
-    sum.unknown = blob.area;
-    return sum;
-  }
-  const int tolerance = static_cast<int>(config_.shadow.test.disparity_px * kDisparityScale);
-  for_each_run(blobs_.labels, blob.box, blob.label, [&](int y, int begin, int end) {
-    const std::uint16_t* now = disparity_.row(y);
-    const std::uint16_t* before = old_disparity_.row(y);
-    int known = 0;
-    int near = 0;
-    int behind = 0;
-    for (int x = begin; x < end; ++x) {
-      const int both = static_cast<int>(now[x] != kNoDisparity) & static_cast<int>(before[x] != kNoDisparity);
-      known += both;
-      near += both & static_cast<int>(now[x] - before[x] > tolerance);
-      behind += both & static_cast<int>(before[x] - now[x] > tolerance);
-    }
-    sum.near += near;
-    sum.behind += behind;
-    sum.own += known - near - behind;
-    sum.unknown += end - begin - known;
-  });
-  return sum;
-}
-
-void Pipeline::measure_strength() noexcept {
-  for (const Blob& blob : blobs_.blobs) {
-    // Neighbours are alike, and a count that has just been stored must be waited for: two tables in turns.
-    std::array<std::array<std::int32_t, 256>, 2> histogram{};
-    for_each_run(blobs_.labels, blob.box, blob.label, [&](int y, int begin, int end) {
-      const std::uint8_t* distance = left_.distance.row(y);
-      for (int x = begin; x < end; ++x) ++histogram[static_cast<std::size_t>(x & 1)][distance[x]];
-    });
-    std::int32_t above = 0;
-    std::size_t level = 255;
-    const auto count = [&] { return histogram[0][level] + histogram[1][level]; };
-    while (level > 0 && (above + count()) * 4 < blob.area) {
-      above += count();
-      --level;
-    }
-    typical_distance_[blob.label] = static_cast<std::uint8_t>(level);
-    const ShadowTest::Evidence sum = evidence_of(blob);
-    ghost_[blob.label] = sum.behind > sum.near ? 1 : 0;
-  }
 }
 
 // Whether the region lies where a target may be that moves, or is a small part of any: no ghost of its own.
@@ -525,7 +473,7 @@ void Pipeline::reject_background() noexcept {
                               .cr_background = in.cr_background,
                               .labels = in.labels};
   for (Blob& blob : blobs_.blobs) {
-    const ShadowTest::Evidence sum = evidence_of(blob);
+    const ShadowTest::Evidence sum = shadow_test_->evidence(in, blob.box, blob.label);
     const int known = sum.near + sum.own + sum.behind;
     const bool enough = known * 100 >= blob.area * kEvidencePercent;
     const bool behind = enough && sum.behind * 100 >= known * kVerdictPercent;
@@ -556,8 +504,7 @@ void Pipeline::remove_shadows() noexcept {
                             left_.mask);
     }
   } else if (background_left_) {
-    measure_strength();
-    (void)shadow_test_->run(shadow_input(), left_.mask);
+    (void)shadow_test_->run(shadow_input(), blobs_.blobs, left_.mask);
     if (umbra_test_) (void)umbra_test_->run(left_.smooth_y, background_left_->luma(), left_.mask);
   }
   for (const Blob& blob : blobs_.blobs) {

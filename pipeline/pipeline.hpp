@@ -118,8 +118,6 @@ class Pipeline {
   void match_blob(const Blob& blob) noexcept;
   [[nodiscard]] bool is_explained(const Blob& blob) const noexcept;
   void reject_background() noexcept;
-  void measure_strength() noexcept;
-  [[nodiscard]] ShadowTest::Evidence evidence_of(const Blob& blob) const noexcept;
   [[nodiscard]] bool resembles_background(const Rect& box, std::uint16_t label, int area) noexcept;
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;
   void remove_shadows() noexcept;
@@ -143,8 +141,6 @@ class Pipeline {
   double dt_ = 0;  ///< since the frame before [s]
   std::span<const Prediction> predictions_;
   BlobSet blobs_;
-  std::span<std::uint8_t> typical_distance_;  ///< by label: 75th percentile of the distance
-  std::span<std::uint8_t> ghost_;             ///< by label: 1 where most of it lies behind the background
   RejectionCounts rejections_{};
 
   Planes left_;

@@ -9,6 +9,7 @@
 #include "pipeline/core/result.hpp"
 #include "pipeline/core/stage.hpp"
 #include "pipeline/motion/shadow_kernel.hpp"
+#include "pipeline/shape/blob_extractor.hpp"
 
 namespace stereotrack {
 
@@ -16,9 +17,9 @@ namespace stereotrack {
 ///
 /// Stereo evidence first, where the present disparity d and the background's own d_b are both known:
 ///     d - d_b > disparity_px       nearer than the background: object, whatever it looks like
-///     d_b - d > disparity_px       behind it, where nothing can be: in a region that is mostly so, the background
-///                                  holds something that has left, a ghost; in another, one of the two is wrong and
-///                                  stereo says nothing
+///     d_b - d > disparity_px       behind it, where nothing can be: in a region with more of it than of nearer pixels,
+///                                  the background holds something that has left, a ghost; in another, one of the two
+///                                  is wrong and stereo says nothing
 ///     else                         the background's own surface: shadow if it looks so, the tolerances below
 ///                                  taken three times as wide
 /// Photometric evidence, where stereo says nothing or "own surface". With r the ratio of the lights over 5x5,
@@ -61,26 +62,31 @@ class ShadowTest {
     ImageView<const std::uint8_t> cr_background;
     ImageView<const std::uint8_t> distance;               ///< to the background, any unit
     ImageView<const std::uint16_t> labels;                ///< region of each pixel, 0 = none
-    std::span<const std::uint8_t> typical;                ///< 75th percentile of distance by label
-    std::span<const std::uint8_t> ghost;                  ///< by label: 1 where the region is mostly behind
     ImageView<const std::uint16_t> disparity;             ///< 1/16 px, kNoDisparity where unknown
     ImageView<const std::uint16_t> disparity_background;  ///< the same of the background
   };
 
-  /// Faults: kBadConfig, kBadSize, kOutOfMemory.
-  [[nodiscard]] static Result<ShadowTest> create(const Config& config, int width, int height, Arena& arena) noexcept;
+  /// max_label: largest label of a region that run() is given, 1..65535. Faults: kBadConfig, kBadSize, kOutOfMemory.
+  [[nodiscard]] static Result<ShadowTest> create(const Config& config, int width, int height, int max_label,
+                                                 Arena& arena) noexcept;
 
-  /// Clears the pixels of `mask` (255 = foreground) that are shadow or light; returns how many.
-  std::uint32_t run(const Input& in, ImageView<std::uint8_t> mask) noexcept;
+  /// Clears the pixels of `mask` (255 = foreground) that are shadow or light; returns how many. `regions`: all labels
+  /// that pixels of the mask have.
+  std::uint32_t run(const Input& in, std::span<const Blob> regions, ImageView<std::uint8_t> mask) noexcept;
 
-  /// How many pixels of the region `label` inside `box` look like the background under another light, darker or
-  /// brighter, with the wide tolerances: to be asked where stereo has said that the surface is the background's own.
+  /// How many pixels of the region `label`, which lies inside `box`, look like the background under another light,
+  /// darker or brighter, with the wide tolerances: to be asked where stereo has said that the surface is the
+  /// background's own. Any label.
   [[nodiscard]] int count_resembling(const Input& in, const Rect& box, std::uint16_t label) noexcept;
 
-  /// Stereo evidence at one pixel, added to `sum`.
-  void weigh(const Input& in, int x, int y, Evidence& sum) const noexcept;
+  /// What stereo says of the pixels of the region `label` inside `box`. Any label.
+  [[nodiscard]] Evidence evidence(const Input& in, const Rect& box, std::uint16_t label) const noexcept;
 
  private:
+  struct Region {
+    std::uint8_t typical = 0;  // 75th percentile of the distance
+    bool ghost = false;
+  };
   enum Verdict : std::int8_t {
     kObject = -1,
     kOutside = 0,
@@ -91,14 +97,15 @@ class ShadowTest {
   enum class Depth : std::uint8_t { kUnknown, kNear, kOwn, kBehind };
   [[nodiscard]] Depth depth_of(const Input& in, int x, int y) const noexcept;
   void look(const Input& in, int y, int from, int to) noexcept;
-  [[nodiscard]] bool looks_like_background(const Input& in, int x, int y, bool wide) const noexcept;
+  [[nodiscard]] bool looks_like_background(const Input& in, int x, int y, bool wide, int typical) const noexcept;
   void judge_row(const Input& in, int y, const std::uint8_t* mask) noexcept;
 
   Config config_;
   LookTolerances tolerances_;
+  std::span<Region> regions_;        // by label
   ImageView<std::int8_t> verdicts_;  // within zeros
   std::span<std::uint8_t> looks_;    // ShadowLook bits of one row, where it was looked at
 };
-static_assert(RealTimeStage<ShadowTest, &ShadowTest::run, &ShadowTest::count_resembling>);
+static_assert(RealTimeStage<ShadowTest, &ShadowTest::run, &ShadowTest::count_resembling, &ShadowTest::evidence>);
 
 }  // namespace stereotrack
