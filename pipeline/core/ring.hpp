@@ -100,6 +100,13 @@ class EvictingRing {
     }
   }
 
+  /// Consumer. False: a pop will find something, unless the producer evicts it first.
+  [[nodiscard]] bool empty() const noexcept {
+    // Acquire, in this order: as in pop.
+    const std::uint64_t read = read_.load(std::memory_order_acquire);
+    return read == write_.load(std::memory_order_acquire);
+  }
+
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return kCapacity; }
 
   /// Any thread. Figures for telemetry: each has one writer and decides nothing, hence relaxed.

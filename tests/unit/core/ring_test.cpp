@@ -13,14 +13,17 @@ namespace {
 
 TEST(EvictingRing, GivesBackInOrder) {
   EvictingRing<int, 4> ring;
+  EXPECT_TRUE(ring.empty());
   EXPECT_EQ(ring.pop(), std::nullopt);
   for (int i = 1; i <= 3; ++i) EXPECT_EQ(ring.push(i), std::nullopt);
+  EXPECT_FALSE(ring.empty());
   EXPECT_EQ(ring.pop(), 1);
   EXPECT_EQ(ring.pop(), 2);
   EXPECT_EQ(ring.push(4), std::nullopt);
   EXPECT_EQ(ring.pop(), 3);
   EXPECT_EQ(ring.pop(), 4);
   EXPECT_EQ(ring.pop(), std::nullopt);
+  EXPECT_TRUE(ring.empty());
   EXPECT_EQ(ring.evicted(), 0U);
 }
 
