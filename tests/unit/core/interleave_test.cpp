@@ -12,6 +12,7 @@
 
 #include "pipeline/core/bounded_vector.hpp"
 #include "pipeline/core/mailbox.hpp"
+#include "pipeline/core/queue.hpp"
 #include "pipeline/core/ring.hpp"
 
 namespace stereotrack {
@@ -244,6 +245,104 @@ struct Halves {
   interleave::Atomic<int> a;
   interleave::Atomic<int> b;
 };
+
+/// The same with copies that take two steps, too.
+struct CopiedHalves {
+  interleave::Atomic<int> a;
+  interleave::Atomic<int> b;
+  CopiedHalves() = default;
+  explicit CopiedHalves(int value) : a(value), b(value) {}
+  CopiedHalves(const CopiedHalves& other) noexcept : a(other.a.load()), b(other.b.load()) {}
+  CopiedHalves& operator=(const CopiedHalves& other) noexcept {
+    if (this != &other) {
+      a.store(other.a.load());
+      b.store(other.b.load());
+    }
+    return *this;
+  }
+  ~CopiedHalves() = default;
+};
+
+template <class Queue, int kPushes, int kPops>
+struct QueueTrial {
+  Queue queue;
+  int pushed = 0;
+  int refused = 0;
+  int popped = 0;
+  std::string wrong;
+
+  void first() {
+    for (int i = 0; i < kPushes; ++i) {
+      if (queue.push(CopiedHalves(pushed + 1))) {
+        ++pushed;
+      } else {
+        ++refused;
+      }
+    }
+  }
+  bool look() {
+    CopiedHalves value;
+    if (!queue.pop(value)) return false;
+    if (value.a.load() != value.b.load()) wrong = "torn";
+    if (value.a.load() != ++popped) wrong = "lost, doubled or out of order";
+    return true;
+  }
+  void second() {
+    for (int i = 0; i < kPops; ++i) (void)look();
+  }
+  std::string fault() {
+    while (popped <= pushed && look()) {
+    }
+    if (wrong.empty() && popped != pushed) wrong = "lost or doubled";
+    if (wrong.empty() && queue.refused() != static_cast<std::uint64_t>(refused)) wrong = "refusals miscounted";
+    return wrong;
+  }
+};
+
+template <std::size_t kCapacity>
+using Queue = HandoverQueue<CopiedHalves, kCapacity, interleave::Atomic>;
+
+TEST(InterleaveQueue, LosesDoublesAndTearsNothing) {
+  expect_right<QueueTrial<Queue<1>, 3, 3>>(10);
+  expect_right<QueueTrial<Queue<2>, 4, 3>>(10);
+  expect_right<QueueTrial<Queue<2>, 5, 2>>(10);
+}
+
+/// Gives the slot back before it has read it.
+template <std::size_t kCapacity>
+class QueueThatMovesOnFirst {
+ public:
+  bool push(const CopiedHalves& value) noexcept {
+    if (next_write_ - read_.load() == kCapacity) {
+      ++refused_;
+      return false;
+    }
+    slots_[next_write_ % kCapacity] = value;
+    write_.store(++next_write_);
+    return true;
+  }
+  bool pop(CopiedHalves& out) noexcept {
+    if (next_read_ == write_.load()) return false;
+    read_.store(next_read_ + 1);
+    out = slots_[next_read_++ % kCapacity];
+    return true;
+  }
+  [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+
+ private:
+  interleave::Atomic<std::uint64_t> read_{0};
+  interleave::Atomic<std::uint64_t> write_{0};
+  std::array<CopiedHalves, kCapacity> slots_{};
+  std::uint64_t next_read_ = 0;
+  std::uint64_t next_write_ = 0;
+  std::uint64_t refused_ = 0;
+};
+
+TEST(InterleaveFindsOut, ASlotGivenBackBeforeItIsRead) {
+  const Exploration found = explore<QueueTrial<QueueThatMovesOnFirst<1>, 2, 1>>();
+  EXPECT_NE(found.fault, "");
+  EXPECT_FALSE(found.complete);
+}
 
 template <class Box, int kPublishes, int kTakes>
 struct MailboxTrial {
