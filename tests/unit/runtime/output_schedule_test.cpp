@@ -611,6 +611,7 @@ TEST(OutputSchedule, WhateverHappensEachSlotEndsOnceAndInOrder) {
     const auto in = [&](double low, double high) {
       return low + (high - low) * 0.001 * static_cast<double>(random() % 1001);
     };
+    std::map<std::uint64_t, MonotonicTime> result_at;
     std::set<std::uint64_t> noticed;
     std::size_t twice = 0;
     for (std::uint64_t i = 1; i <= 300; ++i) {
@@ -623,7 +624,10 @@ TEST(OutputSchedule, WhateverHappensEachSlotEndsOnceAndInOrder) {
         rig.notice(capture + delay + in(0, 20), i, capture);
         ++twice;
       }
-      if (random() % 15 != 0) rig.result(capture + in(2, 40), i, capture);
+      if (random() % 15 != 0) {
+        result_at[i] = at(capture + in(2, 40));
+        rig.result(ms_of(result_at[i]), i, capture);
+      }
     }
     rig.suspend(in(500, 1000), in(1000, 1400));
     rig.run_until(4000);
@@ -637,6 +641,13 @@ TEST(OutputSchedule, WhateverHappensEachSlotEndsOnceAndInOrder) {
       if (sent.output.ordinal != 0) {
         ASSERT_TRUE(told.insert(sent.output.ordinal).second) << "seed " << seed;
         ASSERT_TRUE(noticed.count(sent.output.ordinal));
+        const auto result = result_at.find(sent.output.ordinal);
+        const bool early = result != result_at.end() && result->second <= sent.output.due - any.lead;
+        const bool late = result == result_at.end() || result->second > at(sent.at_ms);
+        // Between the two, it depends on when the loop looked.
+        ASSERT_FALSE(early && sent.output.kind != Kind::kOnTime && !sent.output.superseded)
+            << "seed " << seed << " pair " << sent.output.ordinal;
+        ASSERT_FALSE(late && sent.output.kind == Kind::kOnTime) << "seed " << seed;
       }
     }
     const auto& counters = rig.schedule.counters();
