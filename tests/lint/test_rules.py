@@ -60,6 +60,9 @@ class Refused(unittest.TestCase):
                 self.refuses("pure", {"pipeline/track/a.cpp": f"#include {header}\n"})
                 self.refuses("pure", {"pipeline/core/a.hpp": HEADER + f"  #  include {header}\n"})
 
+    def test_atomics_in_a_stage(self):
+        self.refuses("pure", {"pipeline/track/a.cpp": "#include <atomic>\n"})
+
     def test_rooms_that_include_each_other(self):
         files = {"pipeline/track/a.cpp": include("pipeline/shape/b.hpp"),
                  "pipeline/shape/b.hpp": HEADER + include("pipeline/motion/c.hpp"),
@@ -128,6 +131,7 @@ class Accepted(unittest.TestCase):
     def test_what_only_looks_like_a_breach(self):
         self.assertEqual(check({
             "pipeline/core/result.hpp": HEADER + "/// .value() is banned, and so is virtual.\n#include <span>\n",
+            "pipeline/core/ring.hpp": HEADER + "#include <atomic>\n",
             "pipeline/track/a.cpp": '#include "pipeline/core/result.hpp"\n#include <Eigen/Core>\nint value(int x);\n',
             "pipeline/shape/b.hpp": HEADER + '#include "pipeline/core/result.hpp"\n',
             "config/a.cpp": "int a;  // NOLINT(misc-x): the schema wants this name\n",
