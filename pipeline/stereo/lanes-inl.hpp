@@ -92,6 +92,11 @@ HWY_INLINE hn::Vec<FourKeys> fold_blocks(D /*tag*/, hn::Vec<D> v) {
 /// The smallest key of each of four vectors: halves of two vectors are put side by side and the smaller kept.
 template <class V>
 HWY_INLINE hn::Vec<FourKeys> smallest_of_each(V a, V b, V c, V d) {
+#if HWY_ARCH_ARM_A64
+  if constexpr (hn::MaxLanes(hn::DFromV<V>()) == 4) {
+    return V(vpminq_u32(vpminq_u32(a.raw, b.raw), vpminq_u32(c.raw, d.raw)));
+  }
+#endif
   const hn::DFromV<V> keys;
   const hn::Repartition<std::uint64_t, hn::DFromV<V> > pairs;
   const V ab = hn::Min(hn::InterleaveLower(keys, a, b), hn::InterleaveUpper(keys, a, b));
@@ -123,18 +128,25 @@ struct BatchBest {
     }
   }
 
-  /// The first `pixels` ids as disparities.
+  /// The first `pixels` ids, which are under 2^15, as disparities; of others, anything.
   HWY_INLINE void disparities(int smallest, int pixels, std::uint16_t* HWY_RESTRICT out) const {
     static_assert(kDisparityScale == 16);
     const FourKeys four;
-    const hn::Rebind<std::int32_t, FourKeys> as_signed;
-    const hn::Rebind<std::uint16_t, FourKeys> narrow;
+    const hn::Repartition<std::int32_t, FourKeys> as_signed;
+    const hn::Repartition<std::int16_t, FourKeys> narrow;
+    const hn::Repartition<std::uint16_t, FourKeys> eight;
     const auto id_only = hn::Set(four, 0xFFFFU);
-    const auto first = hn::Set(four, static_cast<std::uint32_t>(smallest));
+    const auto first = hn::Set(eight, static_cast<std::uint16_t>(smallest));
+    const auto ids = [&](int k) HWY_ATTR { return hn::BitCast(as_signed, hn::And(hn::Load(four, keys + k), id_only)); };
     int j = 0;
-    for (; j + 4 <= pixels; j += 4) {
-      const auto d = hn::ShiftLeft<4>(hn::Add(hn::And(hn::Load(four, keys + j), id_only), first));
-      hn::StoreU(hn::DemoteTo(narrow, hn::BitCast(as_signed, d)), narrow, out + j);
+    for (; j + 8 <= pixels; j += 8) {
+      const auto both = hn::BitCast(eight, hn::ReorderDemote2To(narrow, ids(j), ids(j + 4)));  // of 128 bits: in order
+      hn::StoreU(hn::ShiftLeft<4>(hn::Add(both, first)), eight, out + j);
+    }
+    if (j + 4 <= pixels) {
+      const auto half = hn::LowerHalf(hn::BitCast(eight, hn::ReorderDemote2To(narrow, ids(j), ids(j))));
+      hn::StoreU(hn::ShiftLeft<4>(hn::Add(half, hn::LowerHalf(first))), hn::Half<decltype(eight)>(), out + j);
+      j += 4;
     }
     for (; j < pixels; ++j) out[j] = static_cast<std::uint16_t>((smallest + id(j)) * kDisparityScale);
   }

@@ -39,8 +39,8 @@ using Bytes = hn::CappedTag<std::uint8_t, static_cast<std::size_t>(kVectors >= 2
 
 template <class D, class V>
 HWY_INLINE V distance(D /*tag*/, V a, V b) {
-#if HWY_ARCH_ARM
-  return hn::Sub(hn::Max(a, b), hn::Min(a, b));  // one instruction there
+#if HWY_ARCH_ARM_A64
+  return V(vabdq_u8(a.raw, b.raw));  // Highway has no name for it yet
 #else
   return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
 #endif
@@ -86,29 +86,71 @@ HWY_INLINE V8 ordered(V8 bytes) {
   return bytes;
 }
 
-/// (entering - leaving), or twice that, as lanes of 16 bits modulo 2^16: one vector or two.
+#if HWY_ARCH_ARM_A64
+HWY_INLINE uint8x16x4_t load_four(const std::uint8_t* from) { return vld1q_u8_x4(from); }
+#endif
+
+/// Adds entering - leaving, or twice that, to lanes of 16 bits modulo 2^16: one vector or two.
 template <int kVectors, bool kTwice, class V8>
-HWY_INLINE void subtract(V8 entering, V8 leaving, Vec* difference) {
+HWY_INLINE void change(V8 entering, V8 leaving, Vec* sums) {
   const Lanes lanes;
   if constexpr (kVectors == 1) {
     const Vec once = hn::Sub(hn::PromoteTo(lanes, entering), hn::PromoteTo(lanes, leaving));
-    difference[0] = kTwice ? hn::Add(once, once) : once;
+    sums[0] = hn::Add(sums[0], kTwice ? hn::Add(once, once) : once);
   } else {
 #if HWY_ARCH_X86
     const Bytes<kVectors> bytes;
     const hn::Repartition<std::uint16_t, Bytes<kVectors> > pairs;
     const hn::RebindToSigned<Bytes<kVectors> > as_signed;
     const auto weights = hn::BitCast(as_signed, hn::Set(pairs, kTwice ? 0xFE02 : 0xFF01));
-    difference[0] = weigh_pairs(hn::InterleaveLower(bytes, entering, leaving), weights);
-    difference[1] = weigh_pairs(hn::InterleaveUpper(bytes, entering, leaving), weights);
+    sums[0] = hn::Add(sums[0], weigh_pairs(hn::InterleaveLower(bytes, entering, leaving), weights));
+    sums[1] = hn::Add(sums[1], weigh_pairs(hn::InterleaveUpper(bytes, entering, leaving), weights));
+#elif HWY_ARCH_ARM_A64
+    const uint8x16_t weight = vdupq_n_u8(kTwice ? 2 : 1);
+    const auto half = [](uint8x16_t v) HWY_ATTR { return vget_low_u8(v); };
+    sums[0] = Vec(vmlsl_u8(vmlal_u8(sums[0].raw, half(entering.raw), half(weight)), half(leaving.raw), half(weight)));
+    sums[1] = Vec(vmlsl_high_u8(vmlal_high_u8(sums[1].raw, entering.raw, weight), leaving.raw, weight));
 #else
     static_assert(!kTwice);
     const hn::Half<Bytes<kVectors> > half;
-    difference[0] = hn::Sub(hn::PromoteTo(lanes, hn::LowerHalf(half, entering)),
-                            hn::PromoteTo(lanes, hn::LowerHalf(half, leaving)));
-    difference[1] = hn::Sub(hn::PromoteTo(lanes, hn::UpperHalf(half, entering)),
-                            hn::PromoteTo(lanes, hn::UpperHalf(half, leaving)));
+    const auto add = [&](Vec sum, auto in, auto out) HWY_ATTR {
+      return hn::Add(sum, hn::Sub(hn::PromoteTo(lanes, in), hn::PromoteTo(lanes, out)));
+    };
+    sums[0] = add(sums[0], hn::LowerHalf(half, entering), hn::LowerHalf(half, leaving));
+    sums[1] = add(sums[1], hn::UpperHalf(half, entering), hn::UpperHalf(half, leaving));
 #endif
+  }
+}
+
+/// The vectors that begin at `from`.
+template <int kCount, class D>
+HWY_INLINE void load(D d, const hn::TFromD<D>* from, hn::Vec<D>* to) {
+#if HWY_ARCH_ARM_A64
+  // One instruction for four of them.
+  if constexpr (kCount >= 4 && hn::MaxLanes(D()) * sizeof(hn::TFromD<D>) == 16) {
+    for (int i = 0; i < kCount; i += 4, from += 4 * hn::MaxLanes(D())) {
+      const auto four = load_four(from);
+      for (int k = 0; k < 4; ++k) to[i + k] = hn::Vec<D>(four.val[k]);
+    }
+    return;
+  }
+#endif
+  for (int i = 0; i < kCount; ++i) to[i] = hn::LoadU(d, from + static_cast<std::size_t>(i) * hn::MaxLanes(D()));
+}
+
+/// Sums from and to memory. Unrolled by hand: what is indexed by a variable anywhere stands in memory everywhere.
+template <int kCount>
+HWY_INLINE void load_sums(const std::uint16_t* from, Vec* to) {
+  if constexpr (kCount > 0) {
+    load_sums<kCount - 1>(from, to);
+    to[kCount - 1] = hn::Load(Lanes(), from + (kCount - 1) * kVector);
+  }
+}
+template <int kCount>
+HWY_INLINE void store_sums(const Vec* from, std::uint16_t* to) {
+  if constexpr (kCount > 0) {
+    store_sums<kCount - 1>(from, to);
+    hn::Store(from[kCount - 1], Lanes(), to + (kCount - 1) * kVector);
   }
 }
 
@@ -145,23 +187,28 @@ class SadLanes {
         lanes_(layout_.lanes),
         padding_(lanes_ - layout_.count),
         smallest_(task.geometry.range.min - padding_),
-        columns_(layout_.columns) {}
+        columns_(layout_.columns),
+        end_entering_(layout_.first_column + columns_ - radius_) {}
 
   [[nodiscard]] DisparityCounts run() noexcept {
     const Rect& box = task_.wanted.box;
     const int height = task_.left.height;
     const int first_row = std::max(box.top - radius_, 0);
-    std::fill_n(s_.column_sums.data(), std::ptrdiff_t{columns_ + 1} * lanes_, std::uint16_t{0});
+    std::fill_n(s_.column_sums.data(), std::ptrdiff_t{before() + columns_} * lanes_, std::uint16_t{0});
     std::fill_n(s_.distances.data(), std::ptrdiff_t{block_} * columns_ * lanes_, std::uint8_t{0});
     std::fill_n(s_.partner_exists.data(), layout_.partners, std::uint8_t{0});
     std::fill_n(s_.partner_exists.data() + layout_.first_partner, layout_.end_partner - layout_.first_partner,
                 std::uint8_t{0xFF});
+    const int end_clipped = std::clamp(radius_ - layout_.partner, 0, layout_.partners);
+    std::fill_n(s_.partner_clips.data(), end_clipped, std::uint8_t{0xFF});
+    std::fill_n(s_.partner_clips.data() + end_clipped, layout_.partners - end_clipped, std::uint8_t{0});
     std::fill_n(s_.right_greys.data(), layout_.partners, std::uint8_t{0});
     for (int x = box.left; x < box.right(); ++x) {
       const auto i = static_cast<std::size_t>(x - layout_.first_column);
       s_.limits[i] = WindowLimits(task_.geometry, x);
       rank(x, s_.limits[i]);
     }
+    ranked_end_ = std::min(ranked_end_, end_entering_);
     for (int y = first_row; y < std::min(box.top + radius_, height); ++y) {
       read_row(y);
       for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { change_columns<vectors()>(lane, 0, columns_); });
@@ -176,15 +223,18 @@ class SadLanes {
  private:
   /// RankedKeys of a column, where it can have them; such columns stand side by side.
   void rank(int x, const WindowLimits& limits) noexcept {
-    const int clipped = limits.end - limits.end_whole;
-    if (block_ > RankedKeys::kLargestBlock || limits.first != limits.first_whole ||
-        limits.first_whole == limits.end_whole || clipped >= RankedKeys::kRanks) {
+    const BlockGeometry& g = task_.geometry;
+    // In the leftmost columns the left picture's end clips windows, too: for partner_clips they are all clipped.
+    const int end_whole =
+        std::clamp(x - radius_ - g.offset + 1 - g.range.min, int{limits.first_whole}, int{limits.end});
+    const int clipped = limits.end - end_whole;
+    if (block_ > RankedKeys::kLargestBlock || limits.first != limits.first_whole || limits.first == limits.end ||
+        clipped >= RankedKeys::kRanks) {
       return;
     }
     if (ranked_end_ != x) ranked_begin_ = x;
     ranked_end_ = x + 1;
     const auto i = static_cast<std::size_t>(x - layout_.first_column);
-    const BlockGeometry& g = task_.geometry;
     RankedKeys& ranked = s_.ranked[i];
     ranked.lane = layout_.count - limits.end;
     for (int slot = 0; slot < RankedKeys::kRanks; ++slot) {
@@ -192,9 +242,12 @@ class SadLanes {
       ranked.weights[slot] = exists ? RankedKeys::weight(g.columns(x, g.range.min + limits.end - 1 - slot)) : 0;
       ranked.ranks[slot] = exists ? static_cast<std::uint32_t>(clipped - slot) : ~0U;
     }
-    s_.whole_weights[i] = RankedKeys::weight(g.columns(x));
-    s_.rank_zero[i] = static_cast<std::uint32_t>(limits.end_whole - 1 + padding_);
+    s_.whole_weights[i] = end_whole == limits.first ? RankedKeys::kNoWeight : RankedKeys::weight(g.columns(x));
+    s_.rank_zero[i] = static_cast<std::uint32_t>(end_whole - 1 + padding_);
   }
+
+  /// Columns of zeros before the first.
+  [[nodiscard]] int before() const { return radius_ + 1; }
 
   /// Sums of a chunk as keys carry the bit that is taken out here: (2 sum + upper) << 16 | id becomes
   /// 2 sum << 16 | id + upper * half a chunk, so that keys of several chunks are comparable.
@@ -263,12 +316,13 @@ class SadLanes {
     const std::uint32_t* left;
     const std::uint8_t* right;
     const std::uint8_t* exists;
+    const std::uint8_t* clips;
     std::uint8_t* distances;
     std::uint16_t* sums;
     std::ptrdiff_t stride;
 
     HWY_INLINE void advance() {
-      ++left, ++right, ++exists;
+      ++left, ++right, ++exists, ++clips;
       distances += stride, sums += stride;
     }
   };
@@ -278,9 +332,14 @@ class SadLanes {
     return {s_.left_greys.data() + i,
             s_.right_greys.data() + at,
             s_.partner_exists.data() + at,
+            s_.partner_clips.data() + at - radius_,
             s_.distances.data() + (std::ptrdiff_t{slot_} * columns_ + i) * lanes_ + lane,
-            s_.column_sums.data() + std::ptrdiff_t{i + 1} * lanes_ + lane,
+            s_.column_sums.data() + std::ptrdiff_t{before() + i} * lanes_ + lane,
             lanes_};
+  }
+  /// The column that the window of pixel x loses.
+  [[nodiscard]] HWY_INLINE const std::uint16_t* column_before(int x, int lane) const {
+    return s_.column_sums.data() + std::ptrdiff_t{before() + x - radius_ - 1 - layout_.first_column} * lanes_ + lane;
   }
 
   /// Brings a column's sums to the new row and adds them to the window's.
@@ -291,22 +350,32 @@ class SadLanes {
     constexpr int kStep = static_cast<int>(hn::MaxLanes(Bytes<kVectors>())) / kVector;
     const hn::Repartition<std::uint32_t, Bytes<kVectors> > fours;
     const auto left = hn::BitCast(bytes, hn::Set(fours, *at.left));
-    for (int k = 0; k < kVectors; k += kStep) {
-      auto entering = distance(bytes, left, hn::LoadU(bytes, at.right + k * kVector));
-      if constexpr (kPartners == Partners::kSome)
-        entering = hn::And(entering, hn::LoadU(bytes, at.exists + k * kVector));
-      if constexpr (kPartners != Partners::kAll) entering = hn::And(entering, chunk.partners[k]);
-      entering = ordered<kVectors>(entering);
-      std::uint8_t* kept = at.distances + k * kVector;
-      Vec change[2];
-      subtract<kVectors, kPairs>(entering, hn::LoadU(bytes, kept), change);
-      hn::StoreU(entering, bytes, kept);
-      for (int i = 0; i < kStep; ++i) {
-        std::uint16_t* sums = at.sums + (k + i) * kVector;
-        const Vec sum = hn::Add(hn::Load(lanes, sums), change[i]);
-        hn::Store(sum, lanes, sums);
-        window[k + i] = hn::Add(window[k + i], sum);
+    constexpr int kBytes = kVectors / kStep;
+    hn::Vec<Bytes<kVectors> > entering[kBytes];
+    hn::Vec<Bytes<kVectors> > leaving[kBytes];
+    load<kBytes>(bytes, at.right, entering);
+    for (int i = 0; i < kBytes; ++i) entering[i] = distance(bytes, left, entering[i]);
+    if constexpr (kPartners == Partners::kSome) {
+      hn::Vec<Bytes<kVectors> > exists[kBytes];
+      load<kBytes>(bytes, at.exists, exists);
+      for (int i = 0; i < kBytes; ++i) entering[i] = hn::And(entering[i], exists[i]);
+    }
+    if constexpr (kPartners != Partners::kAll) {
+      for (int i = 0; i < kBytes; ++i) entering[i] = hn::And(entering[i], chunk.partners[i * kStep]);
+    }
+    for (int i = 0; i < kBytes; ++i) entering[i] = ordered<kVectors>(entering[i]);
+    load<kBytes>(bytes, at.distances, leaving);
+    for (int i = 0; i < kBytes; ++i) hn::StoreU(entering[i], bytes, at.distances + i * kStep * kVector);
+    // Four at a time: neighbours are read and written in one instruction where there is such a one.
+    constexpr int kFew = std::min(kVectors, 4);
+    for (int k = 0; k < kVectors; k += kFew) {
+      Vec sums[kFew];
+      for (int i = 0; i < kFew; ++i) sums[i] = hn::Load(lanes, at.sums + (k + i) * kVector);
+      for (int i = 0; i < kFew; i += kStep) {
+        change<kVectors, kPairs>(entering[(k + i) / kStep], leaving[(k + i) / kStep], sums + i);
       }
+      for (int i = 0; i < kFew; ++i) hn::Store(sums[i], lanes, at.sums + (k + i) * kVector);
+      for (int i = 0; i < kFew; ++i) window[k + i] = hn::Add(window[k + i], sums[i]);
     }
   }
 
@@ -330,6 +399,67 @@ class SadLanes {
     return keys_of(smallest, id);
   }
 
+  /// Sums of a chunk, lanes in their order.
+  template <int kVectors>
+  static HWY_INLINE void store_in_order(const Vec* sums, std::uint16_t* to) {
+    const Lanes lanes;
+    for (int k = 0; k < kVectors; ++k) {
+      if constexpr (kInOrder<kVectors>) {
+        hn::Store(sums[k], lanes, to + k * kVector);
+      } else {
+        const hn::Half<Lanes> half;
+        static_assert(kVectors * 16 == 2 * kLaneStep);
+        std::uint16_t* at = to + k / 2 * 2 * kVector + k % 2 * 8;
+        hn::Store(hn::LowerHalf(half, sums[k]), half, at);
+        hn::Store(hn::UpperHalf(half, sums[k]), half, at + 16);
+      }
+    }
+  }
+
+  /// Moves the window to the next pixel, and finds the best keys of whole windows there. Partners::kSome: all sums are
+  /// kept, too.
+  template <int kVectors, Partners kPartners>
+  static HWY_INLINE KeyVec step(Column& entering, const std::uint16_t*& gone, std::uint16_t*& kept,
+                                const Chunk<kVectors>& chunk, Vec* window) {
+    enter<kVectors, kPartners>(entering, chunk, window);
+    leave<kVectors>(gone, window);
+    gone += entering.stride;
+    if constexpr (kPartners == Partners::kSome) {
+      store_in_order<kVectors>(window, kept);
+      kept += entering.stride;
+      Vec whole[kVectors];
+      for (int k = 0; k < kVectors; ++k) whole[k] = window[k];
+      exclude<kVectors>(entering.clips, whole);
+      entering.advance();
+      return best_keys<kVectors>(chunk, whole);
+    } else {
+      entering.advance();
+      return best_keys<kVectors>(chunk, window);
+    }
+  }
+
+  /// Lanes whose byte is 0xFF.
+  template <int kVectors>
+  static HWY_INLINE void exclude(const std::uint8_t* clips, Vec* sums) {
+    const Bytes<kVectors> bytes;
+    const Lanes lanes;
+    if constexpr (kVectors == 1) {
+      const hn::RebindToSigned<Lanes> as_signed;
+      const auto wide = hn::PromoteTo(as_signed, hn::BitCast(hn::RebindToSigned<Bytes<1> >(), hn::LoadU(bytes, clips)));
+      sums[0] = hn::Or(sums[0], hn::BitCast(lanes, wide));
+    } else {
+      constexpr int kStep = static_cast<int>(hn::MaxLanes(Bytes<kVectors>())) / kVector;
+      static_assert(kStep == 2);
+      hn::Vec<Bytes<kVectors> > vectors[kVectors / kStep];
+      load<kVectors / kStep>(bytes, clips, vectors);
+      for (int k = 0; k < kVectors; k += kStep) {
+        const auto clipped = ordered<kVectors>(vectors[k / kStep]);
+        sums[k] = hn::Or(sums[k], hn::BitCast(lanes, hn::InterleaveLower(bytes, clipped, clipped)));
+        sums[k + 1] = hn::Or(sums[k + 1], hn::BitCast(lanes, hn::InterleaveUpper(bytes, clipped, clipped)));
+      }
+    }
+  }
+
   /// Columns [begin, end) of the region.
   template <int kVectors>
   HWY_INLINE void change_columns(int lane, int begin, int end) const {
@@ -351,76 +481,52 @@ class SadLanes {
     const int end = std::min(span.last + radius_ + 1 - layout_.first_column, columns_);
     change_columns<kVectors>(lane, 0, begin);
     // The column before the first is what the first pixel's window loses; before the region's first stand zeros.
-    const std::uint16_t* before = s_.column_sums.data() + std::ptrdiff_t{begin} * lanes_ + lane;
+    const std::uint16_t* before = column_before(begin + radius_ + layout_.first_column, lane);
     Vec window[kVectors];
     for (int k = 0; k < kVectors; ++k) window[k] = hn::Or(hn::Load(lanes, before + k * kVector), chunk.marks[k]);
     Column at = column(begin, lane);
     for (int i = begin; i < middle; ++i, at.advance()) enter<kVectors, Partners::kSome>(at, chunk, window);
-    for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
+    store_sums<kVectors>(window, s_.window_sums.data() + lane);
     change_columns<kVectors>(lane, end, columns_);
   }
 
-  /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole.
+  /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole. Partners::kSome:
+  /// where the right picture's left end clips some, whose sums are kept.
   template <int kVectors, Partners kPartners, bool kFirst>
   HWY_INLINE void slide(int lane, int x, int size, BatchBest& best) const {
     const Lanes lanes;
     const Chunk<kVectors> chunk(layout_, lane);
     Vec window[kVectors];
-    for (int k = 0; k < kVectors; ++k) window[k] = hn::Load(lanes, s_.window_sums.data() + lane + k * kVector);
+    load_sums<kVectors>(s_.window_sums.data() + lane, window);
     Column entering = column(x + radius_ - layout_.first_column, lane);
-    const std::uint16_t* gone =
-        s_.column_sums.data() + std::ptrdiff_t{x - radius_ - layout_.first_column} * lanes_ + lane;
-    const std::ptrdiff_t stride = lanes_;
+    const std::uint16_t* gone = column_before(x, lane);
+    std::uint16_t* kept = s_.batch_sums.data() + lane;
     for (int j = 0; j < size; j += 4) {
       KeyVec keys[4];
-      for (int i = 0; i < 4; ++i, entering.advance(), gone += stride) {
-        enter<kVectors, kPartners>(entering, chunk, window);
-        leave<kVectors>(gone, window);
-        keys[i] = best_keys<kVectors>(chunk, window);
-      }
+      for (int i = 0; i < 4; ++i) keys[i] = step<kVectors, kPartners>(entering, gone, kept, chunk, window);
       const FourKeys four;
       auto found = comparable<kVectors>(four, smallest_of_each(keys[0], keys[1], keys[2], keys[3]));
       if constexpr (!kFirst) found = hn::Min(found, hn::Load(four, best.keys + j));
       hn::Store(found, four, best.keys + j);
     }
-    for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
+    store_sums<kVectors>(window, s_.window_sums.data() + lane);
   }
 
-  /// Sums of a chunk, lanes in their order.
-  template <int kVectors>
-  static HWY_INLINE void store_in_order(const Vec* sums, std::uint16_t* to) {
-    const Lanes lanes;
-    for (int k = 0; k < kVectors; ++k) {
-      if constexpr (kInOrder<kVectors>) {
-        hn::Store(sums[k], lanes, to + k * kVector);
-      } else {
-        const hn::Half<Lanes> half;
-        static_assert(kVectors * 16 == 2 * kLaneStep);
-        std::uint16_t* at = to + k / 2 * 2 * kVector + k % 2 * 8;
-        hn::Store(hn::LowerHalf(half, sums[k]), half, at);
-        hn::Store(hn::UpperHalf(half, sums[k]), half, at + 16);
-      }
-    }
-  }
-
-  /// The same where windows may be clipped: all sums are kept, and only whole windows are offered.
+  /// The same where anything may clip windows: all sums are kept, and only whole windows are offered.
   template <int kVectors, bool kFirst>
   HWY_INLINE void slide_clipped(int lane, int x, int size, BatchBest& best) const {
     const Lanes lanes;
     const Chunk<kVectors> chunk(layout_, lane);
     Vec window[kVectors];
-    for (int k = 0; k < kVectors; ++k) window[k] = hn::Load(lanes, s_.window_sums.data() + lane + k * kVector);
+    load_sums<kVectors>(s_.window_sums.data() + lane, window);
     Column entering = column(x + radius_ - layout_.first_column, lane);
-    const std::uint16_t* gone =
-        s_.column_sums.data() + std::ptrdiff_t{x - radius_ - layout_.first_column} * lanes_ + lane;
+    const std::uint16_t* gone = column_before(x, lane);
     const std::ptrdiff_t stride = lanes_;
-    const int last_entering = columns_ - 1 - radius_ + layout_.first_column;
-    const int first_leaving = layout_.first_column + radius_;
     const WindowLimits* limits = s_.limits.data() + (x - layout_.first_column);
     std::uint16_t* kept = s_.batch_sums.data() + lane;
     for (int j = 0; j < size; ++j, entering.advance(), gone += stride, kept += stride) {
-      if (x + j <= last_entering) enter<kVectors, Partners::kSome>(entering, chunk, window);
-      if (x + j >= first_leaving) leave<kVectors>(gone, window);
+      if (x + j < end_entering_) enter<kVectors, Partners::kSome>(entering, chunk, window);
+      leave<kVectors>(gone, window);
       store_in_order<kVectors>(window, kept);
       Vec whole[kVectors];
       for (int k = 0; k < kVectors; ++k) {
@@ -429,7 +535,7 @@ class SadLanes {
       }
       best.offer<kFirst>(j, comparable<kVectors>(Keys(), best_keys<kVectors>(chunk, whole)));
     }
-    for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
+    store_sums<kVectors>(window, s_.window_sums.data() + lane);
   }
 
   void match_inner(int x, int size) noexcept {
@@ -456,16 +562,22 @@ class SadLanes {
       }
     });
     best.find(size);
-    for (int j = 0; j < size;) {
-      if (j + 4 <= size && x + j >= ranked_begin_ && x + j + 4 <= ranked_end_) {
-        choose_four(x + j, j);
-        j += 4;
-      } else {
-        best.keys[j] = choose(x + j, j);
-        nones_ += best.keys[j] == kNoId ? 1 : 0;
-        ++j;
-      }
+    for (int j = 0; j < size; ++j) {
+      best.keys[j] = choose(x + j, j);
+      nones_ += best.keys[j] == kNoId ? 1 : 0;
     }
+  }
+
+  void match_ranked(int x, int size) noexcept {
+    BatchBest& best = best_;
+    for_each_chunk(lanes_, [&](auto vectors, int lane, bool first) {
+      if (first) {
+        slide<vectors(), Partners::kSome, true>(lane, x, size, best);
+      } else {
+        slide<vectors(), Partners::kSome, false>(lane, x, size, best);
+      }
+    });
+    for (int j = 0; j < size; j += 4) choose_four(x + j, j);
   }
 
   /// The best candidates of pixels x..x+3, the j-th and following of their batch, of those with whole windows and those
@@ -521,15 +633,20 @@ class SadLanes {
       return;
     }
     for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { start_row<vectors()>(lane, span); });
+    const int end_ranked = std::min(ranked_end_, span.last + 1);
     for (int x = span.first; x <= span.last;) {
-      // What is left of the fours goes the way of the clipped.
+      // What is left of the fours goes the general way.
       int size = layout_.batch(x, span.last);
       nones_ = 0;
-      const bool inner = layout_.is_inner(x) && size >= 4;
-      if (inner) {
+      if (layout_.is_inner(x) && size >= 4) {
         size = size / 4 * 4;
         match_inner(x, size);
+      } else if (x >= ranked_begin_ && end_ranked - x >= 4) {
+        // The last four may have inner pixels, too.
+        size = std::min((size + 3) / 4 * 4, (end_ranked - x) / 4 * 4);
+        match_ranked(x, size);
       } else {
+        if (x < ranked_begin_) size = std::min(size, ranked_begin_ - x);
         match_clipped(x, size);
       }
       if (task_.mask.empty()) {
@@ -601,6 +718,7 @@ class SadLanes {
   int padding_;   ///< of lanes_
   int smallest_;  ///< disparity of id 0, maybe of padding [px]
   int columns_;
+  int end_entering_;      ///< from this pixel on no column enters the window
   int slot_ = -1;         ///< of distances, of the row that enters
   int ranked_begin_ = 0;  ///< pixels [begin, end) have RankedKeys
   int ranked_end_ = -1;
@@ -610,7 +728,7 @@ class SadLanes {
 };
 
 DisparityCounts match_in_lanes(const SadTask& task, SadScratch& scratch) {
-#if HWY_ARCH_X86
+#if HWY_ARCH_X86 || HWY_ARCH_ARM_A64
   if (2 * task.geometry.radius + 1 <= kLargestPairedBlock) return SadLanes<true>(task, scratch).run();
 #endif
   return SadLanes<false>(task, scratch).run();
@@ -633,7 +751,7 @@ SadScratch SadScratch::create(int width, int block, int disparities, Arena& aren
   const auto lanes = static_cast<std::size_t>(padded_lanes(disparities));
   SadScratch s;
   s.distances = arena.array<std::uint8_t>(static_cast<std::size_t>(block) * columns * lanes);
-  s.column_sums = arena.array<std::uint16_t>((columns + 1) * lanes);
+  s.column_sums = arena.array<std::uint16_t>((columns + static_cast<std::size_t>(block / 2) + 1) * lanes);
   s.window_sums = arena.array<std::uint16_t>(lanes);
   s.batch_sums = arena.array<std::uint16_t>(lanes * kPixelStep + kLaneStep);  // read in vectors
   s.reference_sums = arena.array<std::uint32_t>(lanes);
@@ -644,6 +762,7 @@ SadScratch SadScratch::create(int width, int block, int disparities, Arena& aren
   s.left_greys = arena.array<std::uint32_t>(columns);
   s.right_greys = arena.array<std::uint8_t>(columns + lanes);
   s.partner_exists = arena.array<std::uint8_t>(columns + lanes);
+  s.partner_clips = arena.array<std::uint8_t>(columns + lanes);
   return s;
 }
 
