@@ -107,54 +107,6 @@ HWY_INLINE hn::Vec<FourKeys> smallest_of_each(V a, V b, V c, V d) {
                                    hn::BitCast(keys, hn::InterleaveUpper(pairs, ab_pairs, cd_pairs))));
 }
 
-/// The best lanes of a batch's pixels.
-struct BatchBest {
-  static constexpr int kKeys = kVector / 2;
-  HWY_ALIGN std::uint32_t lanes[kBatch * kKeys];  ///< a vector of keys for each pixel
-  HWY_ALIGN std::uint32_t keys[kBatch];           ///< the smallest of each
-
-  template <bool kFirst>
-  HWY_INLINE void offer(int pixel, KeyVec offered) {
-    std::uint32_t* at = lanes + pixel * kKeys;
-    if constexpr (!kFirst) offered = hn::Min(offered, hn::Load(Keys(), at));
-    hn::Store(offered, Keys(), at);
-  }
-
-  /// Of the first `pixels`, rounded up to fours.
-  HWY_INLINE void find(int pixels) {
-    for (int j = 0; j < pixels; j += 4) {
-      const auto vector = [&](int pixel) HWY_ATTR { return hn::Load(Keys(), lanes + (j + pixel) * kKeys); };
-      hn::Store(smallest_of_each(vector(0), vector(1), vector(2), vector(3)), FourKeys(), keys + j);
-    }
-  }
-
-  /// The first `pixels` ids, which are under 2^15, as disparities; of others, anything.
-  HWY_INLINE void disparities(int smallest, int pixels, std::uint16_t* HWY_RESTRICT out) const {
-    static_assert(kDisparityScale == 16);
-    const FourKeys four;
-    const hn::Repartition<std::int32_t, FourKeys> as_signed;
-    const hn::Repartition<std::int16_t, FourKeys> narrow;
-    const hn::Repartition<std::uint16_t, FourKeys> eight;
-    const auto id_only = hn::Set(four, 0xFFFFU);
-    const auto first = hn::Set(eight, static_cast<std::uint16_t>(smallest));
-    const auto ids = [&](int k) HWY_ATTR { return hn::BitCast(as_signed, hn::And(hn::Load(four, keys + k), id_only)); };
-    int j = 0;
-    for (; j + 8 <= pixels; j += 8) {
-      const auto both = hn::BitCast(eight, hn::ReorderDemote2To(narrow, ids(j), ids(j + 4)));  // of 128 bits: in order
-      hn::StoreU(hn::ShiftLeft<4>(hn::Add(both, first)), eight, out + j);
-    }
-    if (j + 4 <= pixels) {
-      const auto half = hn::LowerHalf(hn::BitCast(eight, hn::ReorderDemote2To(narrow, ids(j), ids(j))));
-      hn::StoreU(hn::ShiftLeft<4>(hn::Add(half, hn::LowerHalf(first))), hn::Half<decltype(eight)>(), out + j);
-      j += 4;
-    }
-    for (; j < pixels; ++j) out[j] = static_cast<std::uint16_t>((smallest + id(j)) * kDisparityScale);
-  }
-
-  [[nodiscard]] std::uint16_t value(int pixel) const { return static_cast<std::uint16_t>(keys[pixel] >> 16); }
-  [[nodiscard]] std::uint16_t id(int pixel) const { return static_cast<std::uint16_t>(keys[pixel]); }
-};
-
 #endif  // HWY_TARGET != HWY_SCALAR
 
 }  // namespace HWY_NAMESPACE

@@ -154,17 +154,94 @@ HWY_INLINE void store_sums(const Vec* from, std::uint16_t* to) {
   }
 }
 
-/// A row of greys, each four times in 32 bits: what fills a vector of bytes fastest.
-HWY_INLINE void four_of_each(const std::uint8_t* HWY_RESTRICT in, int count, std::uint32_t* HWY_RESTRICT out) {
+#if HWY_ARCH_ARM_A64
+/// A grey as it fills a vector of bytes fastest.
+using Grey = std::uint8_t;
+HWY_INLINE std::uint8_t* left_greys(SadScratch& s) { return s.left_bytes.data(); }
+HWY_INLINE void copy_greys(const std::uint8_t* HWY_RESTRICT in, int count, Grey* HWY_RESTRICT out) {
+  std::copy_n(in, count, out);
+}
+#else
+/// A grey as it fills a vector of bytes fastest: four times.
+using Grey = std::uint32_t;
+HWY_INLINE std::uint32_t* left_greys(SadScratch& s) { return s.left_greys.data(); }
+HWY_INLINE void copy_greys(const std::uint8_t* HWY_RESTRICT in, int count, Grey* HWY_RESTRICT out) {
   constexpr std::uint32_t kFour = 0x01010101;
   const hn::Rebind<std::uint8_t, Keys> bytes;
   constexpr int kStep = static_cast<int>(hn::MaxLanes(Keys()));
-  int i = 0;
-  for (; i + kStep <= count; i += kStep) {
+  const auto copy = [&](int i) HWY_ATTR {
     hn::StoreU(hn::Mul(hn::PromoteTo(Keys(), hn::LoadU(bytes, in + i)), hn::Set(Keys(), kFour)), Keys(), out + i);
-  }
+  };
+  int i = 0;
+  for (; i + kStep <= count; i += kStep) copy(i);
+  if (i == count) return;
+  if (count >= kStep) return copy(count - kStep);
   for (; i < count; ++i) out[i] = in[i] * kFour;
 }
+#endif
+
+/// The best lanes of a batch's pixels.
+struct BatchBest {
+  static constexpr int kKeys = kVector / 2;
+  HWY_ALIGN std::uint32_t lanes[kSadPixelStep * kKeys];  ///< a vector of keys for each pixel
+  HWY_ALIGN std::uint32_t keys[kSadPixelStep];           ///< the smallest of each
+
+  template <bool kFirst>
+  HWY_INLINE void offer(int pixel, KeyVec offered) {
+    std::uint32_t* at = lanes + pixel * kKeys;
+    if constexpr (!kFirst) offered = hn::Min(offered, hn::Load(Keys(), at));
+    hn::Store(offered, Keys(), at);
+  }
+
+  /// Of the first `pixels`, rounded up to fours.
+  HWY_INLINE void find(int pixels) {
+    for (int j = 0; j < pixels; j += 4) {
+      const auto vector = [&](int pixel) HWY_ATTR { return hn::Load(Keys(), lanes + (j + pixel) * kKeys); };
+      hn::Store(smallest_of_each(vector(0), vector(1), vector(2), vector(3)), FourKeys(), keys + j);
+    }
+  }
+
+  /// Ids from `pixel` on, as many as d has; those that are larger as kLargestId.
+  static constexpr std::uint16_t kLargestId = 0x7FFF;
+  using Eight = hn::Full128<std::uint16_t>;
+  using Four = hn::Half<Eight>;
+  [[nodiscard]] HWY_INLINE hn::Vec<Eight> ids(Eight d, int pixel) const { return narrow(d, pixel, pixel + 4); }
+  [[nodiscard]] HWY_INLINE hn::Vec<Four> ids(Four /*d*/, int pixel) const {
+    return hn::LowerHalf(narrow(Eight(), pixel, pixel));
+  }
+
+  template <class D, class V>
+  [[nodiscard]] static HWY_INLINE V disparity(D d, V id, int smallest) {
+    static_assert(kDisparityScale == 16);
+    return hn::ShiftLeft<4>(hn::Add(id, hn::Set(d, static_cast<std::uint16_t>(smallest))));
+  }
+
+  /// The first `pixels` ids as disparities.
+  HWY_INLINE void disparities(int smallest, int pixels, std::uint16_t* HWY_RESTRICT out) const {
+    const auto write = [&](auto d, int j) HWY_ATTR { hn::StoreU(disparity(d, ids(d, j), smallest), d, out + j); };
+    int j = 0;
+    for (; j + 8 <= pixels; j += 8) write(Eight(), j);
+    if (j + 4 <= pixels) {
+      write(Four(), j);
+      j += 4;
+    }
+    for (; j < pixels; ++j) out[j] = static_cast<std::uint16_t>((smallest + id(j)) * kDisparityScale);
+  }
+
+  [[nodiscard]] std::uint16_t id(int pixel) const { return static_cast<std::uint16_t>(keys[pixel]); }
+
+ private:
+  [[nodiscard]] HWY_INLINE hn::Vec<Eight> narrow(Eight eight, int first, int second) const {
+    const FourKeys four;
+    const hn::Repartition<std::int32_t, FourKeys> as_signed;
+    const auto four_ids = [&](int pixel) HWY_ATTR {
+      return hn::BitCast(as_signed, hn::And(hn::Load(four, keys + pixel), hn::Set(four, 0xFFFFU)));
+    };
+    // Vectors of 128 bits stay in order.
+    return hn::BitCast(
+        eight, hn::ReorderDemote2To(hn::Repartition<std::int16_t, FourKeys>(), four_ids(first), four_ids(second)));
+  }
+};
 
 /// Which partners a pass meets.
 enum class Partners {
@@ -188,14 +265,14 @@ class SadLanes {
         padding_(lanes_ - layout_.count),
         smallest_(task.geometry.range.min - padding_),
         columns_(layout_.columns),
-        end_entering_(layout_.first_column + columns_ - radius_) {}
+        end_entering_(layout_.first_column + columns_ - radius_),
+        all_exist_(padding_ == 0 && layout_.first_partner == 0 && layout_.end_partner == layout_.partners) {}
 
   [[nodiscard]] DisparityCounts run() noexcept {
     const Rect& box = task_.wanted.box;
     const int height = task_.left.height;
     const int first_row = std::max(box.top - radius_, 0);
     std::fill_n(s_.column_sums.data(), std::ptrdiff_t{before() + columns_} * lanes_, std::uint16_t{0});
-    std::fill_n(s_.distances.data(), std::ptrdiff_t{block_} * columns_ * lanes_, std::uint8_t{0});
     std::fill_n(s_.partner_exists.data(), layout_.partners, std::uint8_t{0});
     std::fill_n(s_.partner_exists.data() + layout_.first_partner, layout_.end_partner - layout_.first_partner,
                 std::uint8_t{0xFF});
@@ -209,9 +286,14 @@ class SadLanes {
       rank(x, s_.limits[i]);
     }
     ranked_end_ = std::min(ranked_end_, end_entering_);
-    for (int y = first_row; y < std::min(box.top + radius_, height); ++y) {
+    // The first rows take the place of none; of other rows there were zeros.
+    const int end_fresh = std::min(box.top + radius_, height);
+    const std::ptrdiff_t row_size = std::ptrdiff_t{columns_} * lanes_;
+    const int fresh = end_fresh - first_row;
+    std::fill_n(s_.distances.data() + fresh * row_size, (block_ - fresh) * row_size, std::uint8_t{0});
+    for (int y = first_row; y < end_fresh; ++y) {
       read_row(y);
-      for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { change_columns<vectors()>(lane, 0, columns_); });
+      enter_columns<true>(0, columns_);
     }
     for (int y = box.top; y < box.bottom(); ++y) {
       read_row(y + radius_);
@@ -266,6 +348,14 @@ class SadLanes {
   /// Of a comparable key.
   [[nodiscard]] static std::uint32_t sum_of(std::uint32_t key) { return key >> (kPairs ? 17 : 16); }
 
+  template <int kCount>
+  static HWY_INLINE void mark_each(const Vec* marks, Vec* window) {
+    if constexpr (kCount > 0) {
+      mark_each<kCount - 1>(marks, window);
+      window[kCount - 1] = hn::Or(window[kCount - 1], marks[kCount - 1]);
+    }
+  }
+
   /// What the passes over a chunk of lanes know.
   template <int kVectors>
   struct Chunk {
@@ -302,10 +392,10 @@ class SadLanes {
     const int existing = layout_.end_partner - layout_.first_partner;
     std::uint8_t* right = s_.right_greys.data() + layout_.first_partner;
     if (y < task_.left.height) {
-      four_of_each(task_.left.row(y) + layout_.first_column, columns_, s_.left_greys.data());
+      copy_greys(task_.left.row(y) + layout_.first_column, columns_, left_greys(s_));
       std::copy_n(task_.right.row(y) + layout_.partner + layout_.first_partner, existing, right);
     } else {
-      std::fill_n(s_.left_greys.data(), columns_, 0U);
+      std::fill_n(left_greys(s_), columns_, Grey{0});
       std::fill_n(right, existing, std::uint8_t{0});
     }
   }
@@ -313,7 +403,7 @@ class SadLanes {
   /// Where a column and its partners stand. A copy by value: what lies behind pointers of pointers would be read again
   /// after each store.
   struct Column {
-    const std::uint32_t* left;
+    const Grey* left;
     const std::uint8_t* right;
     const std::uint8_t* exists;
     const std::uint8_t* clips;
@@ -329,7 +419,7 @@ class SadLanes {
 
   [[nodiscard]] HWY_INLINE Column column(int i, int lane) const {
     const std::ptrdiff_t at = std::ptrdiff_t{i} + lane;
-    return {s_.left_greys.data() + i,
+    return {left_greys(s_) + i,
             s_.right_greys.data() + at,
             s_.partner_exists.data() + at,
             s_.partner_clips.data() + at - radius_,
@@ -342,14 +432,13 @@ class SadLanes {
     return s_.column_sums.data() + std::ptrdiff_t{before() + x - radius_ - 1 - layout_.first_column} * lanes_ + lane;
   }
 
-  /// Brings a column's sums to the new row and adds them to the window's.
-  template <int kVectors, Partners kPartners>
+  /// Brings a column's sums to the new row and adds them to the window's. kFresh: no row leaves.
+  template <int kVectors, Partners kPartners, bool kFresh = false>
   static HWY_INLINE void enter(const Column& at, const Chunk<kVectors>& chunk, Vec* window) {
     const Lanes lanes;
     const Bytes<kVectors> bytes;
     constexpr int kStep = static_cast<int>(hn::MaxLanes(Bytes<kVectors>())) / kVector;
-    const hn::Repartition<std::uint32_t, Bytes<kVectors> > fours;
-    const auto left = hn::BitCast(bytes, hn::Set(fours, *at.left));
+    const auto left = hn::BitCast(bytes, hn::Set(hn::Repartition<Grey, Bytes<kVectors> >(), *at.left));
     constexpr int kBytes = kVectors / kStep;
     hn::Vec<Bytes<kVectors> > entering[kBytes];
     hn::Vec<Bytes<kVectors> > leaving[kBytes];
@@ -364,7 +453,11 @@ class SadLanes {
       for (int i = 0; i < kBytes; ++i) entering[i] = hn::And(entering[i], chunk.partners[i * kStep]);
     }
     for (int i = 0; i < kBytes; ++i) entering[i] = ordered<kVectors>(entering[i]);
-    load<kBytes>(bytes, at.distances, leaving);
+    if constexpr (kFresh) {
+      for (int i = 0; i < kBytes; ++i) leaving[i] = hn::Zero(bytes);
+    } else {
+      load<kBytes>(bytes, at.distances, leaving);
+    }
     for (int i = 0; i < kBytes; ++i) hn::StoreU(entering[i], bytes, at.distances + i * kStep * kVector);
     // Four at a time: neighbours are read and written in one instruction where there is such a one.
     constexpr int kFew = std::min(kVectors, 4);
@@ -461,33 +554,44 @@ class SadLanes {
   }
 
   /// Columns [begin, end) of the region.
-  template <int kVectors>
+  template <int kVectors, Partners kPartners, bool kFresh>
   HWY_INLINE void change_columns(int lane, int begin, int end) const {
     if (begin >= end) return;
     const Chunk<kVectors> chunk(layout_, lane);
-    Vec unused[kVectors];
-    for (int k = 0; k < kVectors; ++k) unused[k] = hn::Zero(Lanes());
     Column at = column(begin, lane);
-    for (int i = begin; i < end; ++i, at.advance()) enter<kVectors, Partners::kSome>(at, chunk, unused);
+    for (int i = begin; i < end; ++i, at.advance()) {
+      Vec unused[kVectors];
+      for (int k = 0; k < kVectors; ++k) unused[k] = hn::Zero(Lanes());
+      enter<kVectors, kPartners, kFresh>(at, chunk, unused);
+    }
+  }
+  template <bool kFresh>
+  void enter_columns(int begin, int end) const {
+    for_each_chunk(lanes_, [&](auto vectors, int lane, bool) {
+      if (all_exist_) {
+        change_columns<vectors(), Partners::kAll, kFresh>(lane, begin, end);
+      } else {
+        change_columns<vectors(), Partners::kSome, kFresh>(lane, begin, end);
+      }
+    });
   }
 
   /// The window just left of the row's first pixel, and all columns that the row's windows do not reach.
-  template <int kVectors>
+  template <int kVectors, Partners kPartners>
   HWY_INLINE void start_row(int lane, Span span) const {
-    const Lanes lanes;
     const Chunk<kVectors> chunk(layout_, lane);
     const int begin = std::max(span.first - radius_, 0) - layout_.first_column;
     const int middle = std::min(span.first + radius_ - layout_.first_column, columns_);
     const int end = std::min(span.last + radius_ + 1 - layout_.first_column, columns_);
-    change_columns<kVectors>(lane, 0, begin);
+    change_columns<kVectors, kPartners, false>(lane, 0, begin);
     // The column before the first is what the first pixel's window loses; before the region's first stand zeros.
-    const std::uint16_t* before = column_before(begin + radius_ + layout_.first_column, lane);
     Vec window[kVectors];
-    for (int k = 0; k < kVectors; ++k) window[k] = hn::Or(hn::Load(lanes, before + k * kVector), chunk.marks[k]);
+    load_sums<kVectors>(column_before(begin + radius_ + layout_.first_column, lane), window);
+    mark_each<kVectors>(chunk.marks, window);
     Column at = column(begin, lane);
-    for (int i = begin; i < middle; ++i, at.advance()) enter<kVectors, Partners::kSome>(at, chunk, window);
+    for (int i = begin; i < middle; ++i, at.advance()) enter<kVectors, kPartners>(at, chunk, window);
     store_sums<kVectors>(window, s_.window_sums.data() + lane);
-    change_columns<kVectors>(lane, end, columns_);
+    change_columns<kVectors, kPartners, false>(lane, end, columns_);
   }
 
   /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole. Partners::kSome:
@@ -629,14 +733,20 @@ class SadLanes {
   void match_row(int y) noexcept {
     const Span span = task_.wanted.span(y);
     if (span.empty()) {
-      for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { change_columns<vectors()>(lane, 0, columns_); });
+      enter_columns<false>(0, columns_);
       return;
     }
-    for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { start_row<vectors()>(lane, span); });
+    for_each_chunk(lanes_, [&](auto vectors, int lane, bool) {
+      if (all_exist_) {
+        start_row<vectors(), Partners::kAll>(lane, span);
+      } else {
+        start_row<vectors(), Partners::kSome>(lane, span);
+      }
+    });
     const int end_ranked = std::min(ranked_end_, span.last + 1);
     for (int x = span.first; x <= span.last;) {
       // What is left of the fours goes the general way.
-      int size = layout_.batch(x, span.last);
+      int size = layout_.batch(x, span.last, kSadPixelStep);
       nones_ = 0;
       if (layout_.is_inner(x) && size >= 4) {
         size = size / 4 * 4;
@@ -662,27 +772,24 @@ class SadLanes {
   void write(int x, int y, int size) noexcept {
     const std::uint8_t* mask = task_.mask.row(y) + x;
     std::uint16_t* out = task_.out.row(y) + x;
-    const FourKeys four;
-    const hn::Rebind<std::int32_t, FourKeys> as_signed;
-    const hn::Rebind<std::uint16_t, FourKeys> narrow;
-    const hn::Rebind<std::uint8_t, FourKeys> bytes;
-    const auto no_id = hn::Set(four, kNoId);
-    const auto smallest = hn::Set(four, static_cast<std::uint32_t>(smallest_));
     std::size_t wanted = 0;
     std::size_t border = 0;
+    const auto write_some = [&](auto d, int j) HWY_ATTR {
+      const hn::Rebind<std::uint8_t, decltype(d)> bytes;
+      const auto found = best_.ids(d, j);
+      const auto none = hn::Eq(found, hn::Set(d, BatchBest::kLargestId));
+      const auto some = BatchBest::disparity(d, found, smallest_);
+      const auto asked = hn::Ne(hn::PromoteTo(d, hn::LoadU(bytes, mask + j)), hn::Zero(d));
+      const auto values = hn::IfThenElse(none, hn::Set(d, kNoDisparity), some);
+      hn::StoreU(hn::IfThenElse(asked, values, hn::LoadU(d, out + j)), d, out + j);
+      wanted += hn::CountTrue(d, asked);
+      if (nones_ != 0) border += hn::CountTrue(d, hn::And(asked, none));
+    };
     int j = 0;
-    for (; j + 4 <= size; j += 4) {
-      const auto asked = hn::LoadU(bytes, mask + j);
-      const auto id = hn::And(hn::Load(four, best_.keys + j), no_id);
-      const auto none = hn::Eq(id, no_id);
-      const auto values = hn::IfThenElse(none, hn::Set(four, kNoDisparity), hn::ShiftLeft<4>(hn::Add(id, smallest)));
-      const auto is_asked = hn::Ne(hn::PromoteTo(narrow, asked), hn::Zero(narrow));
-      hn::StoreU(
-          hn::IfThenElse(is_asked, hn::DemoteTo(narrow, hn::BitCast(as_signed, values)), hn::LoadU(narrow, out + j)),
-          narrow, out + j);
-      const auto counted = hn::Ne(hn::PromoteTo(four, asked), hn::Zero(four));
-      wanted += hn::CountTrue(four, counted);
-      border += hn::CountTrue(four, hn::And(counted, none));
+    for (; j + 8 <= size; j += 8) write_some(BatchBest::Eight(), j);
+    if (j + 4 <= size) {
+      write_some(BatchBest::Four(), j);
+      j += 4;
     }
     for (; j < size; ++j) {
       if (mask[j] == 0) continue;
@@ -719,6 +826,7 @@ class SadLanes {
   int smallest_;  ///< disparity of id 0, maybe of padding [px]
   int columns_;
   int end_entering_;      ///< from this pixel on no column enters the window
+  bool all_exist_;        ///< each lane of each column has a partner
   int slot_ = -1;         ///< of distances, of the row that enters
   int ranked_begin_ = 0;  ///< pixels [begin, end) have RankedKeys
   int ranked_end_ = -1;
@@ -753,13 +861,14 @@ SadScratch SadScratch::create(int width, int block, int disparities, Arena& aren
   s.distances = arena.array<std::uint8_t>(static_cast<std::size_t>(block) * columns * lanes);
   s.column_sums = arena.array<std::uint16_t>((columns + static_cast<std::size_t>(block / 2) + 1) * lanes);
   s.window_sums = arena.array<std::uint16_t>(lanes);
-  s.batch_sums = arena.array<std::uint16_t>(lanes * kPixelStep + kLaneStep);  // read in vectors
+  s.batch_sums = arena.array<std::uint16_t>(lanes * kSadPixelStep + kLaneStep);  // read in vectors
   s.reference_sums = arena.array<std::uint32_t>(lanes);
   s.limits = arena.array<WindowLimits>(columns);
   s.ranked = arena.array<RankedKeys>(columns);
   s.whole_weights = arena.array<std::uint32_t>(columns);
   s.rank_zero = arena.array<std::uint32_t>(columns);
   s.left_greys = arena.array<std::uint32_t>(columns);
+  s.left_bytes = arena.array<std::uint8_t>(columns);
   s.right_greys = arena.array<std::uint8_t>(columns + lanes);
   s.partner_exists = arena.array<std::uint8_t>(columns + lanes);
   s.partner_clips = arena.array<std::uint8_t>(columns + lanes);
