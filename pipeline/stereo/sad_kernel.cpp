@@ -245,10 +245,14 @@ struct BatchBest {
 
 /// Which partners a pass meets.
 enum class Partners {
-  kAll,     ///< every lane has one
-  kPadded,  ///< every lane that is not padding
-  kSome,    ///< they are looked up
+  kAll,         ///< every lane has one
+  kPadded,      ///< every lane that is not padding
+  kSome,        ///< they are looked up
+  kSomePadded,  ///< likewise, and there is padding
+  kNone,        ///< no column enters
 };
+constexpr bool are_looked_up(Partners p) { return p == Partners::kSome || p == Partners::kSomePadded; }
+constexpr bool are_padded(Partners p) { return p == Partners::kPadded || p == Partners::kSomePadded; }
 
 /// kPairs: sums are kept twice as large, and bit 0 says in which half of its chunk a lane stands: then the smaller of
 /// two lanes, one of each half, knows where it comes from. Where instructions for it are at hand and 16 bits hold it.
@@ -286,6 +290,10 @@ class SadLanes {
       rank(x, s_.limits[i]);
     }
     ranked_end_ = std::min(ranked_end_, end_entering_);
+    for (int x = std::max(end_entering_, box.left); x < box.right(); ++x) {
+      const WindowLimits& limits = s_.limits[static_cast<std::size_t>(x - layout_.first_column)];
+      end_is_whole_ = end_is_whole_ && limits.first_whole == 0 && limits.end_whole == layout_.count;
+    }
     // The first rows take the place of none; of other rows there were zeros.
     const int end_fresh = std::min(box.top + radius_, height);
     const std::ptrdiff_t row_size = std::ptrdiff_t{columns_} * lanes_;
@@ -444,12 +452,12 @@ class SadLanes {
     hn::Vec<Bytes<kVectors> > leaving[kBytes];
     load<kBytes>(bytes, at.right, entering);
     for (int i = 0; i < kBytes; ++i) entering[i] = distance(bytes, left, entering[i]);
-    if constexpr (kPartners == Partners::kSome) {
+    if constexpr (are_looked_up(kPartners)) {
       hn::Vec<Bytes<kVectors> > exists[kBytes];
       load<kBytes>(bytes, at.exists, exists);
       for (int i = 0; i < kBytes; ++i) entering[i] = hn::And(entering[i], exists[i]);
     }
-    if constexpr (kPartners != Partners::kAll) {
+    if constexpr (are_padded(kPartners)) {
       for (int i = 0; i < kBytes; ++i) entering[i] = hn::And(entering[i], chunk.partners[i * kStep]);
     }
     for (int i = 0; i < kBytes; ++i) entering[i] = ordered<kVectors>(entering[i]);
@@ -509,15 +517,15 @@ class SadLanes {
     }
   }
 
-  /// Moves the window to the next pixel, and finds the best keys of whole windows there. Partners::kSome: all sums are
-  /// kept, too.
+  /// Moves the window to the next pixel, and finds the best keys of whole windows there. Where partners are looked up
+  /// all sums are kept, too.
   template <int kVectors, Partners kPartners>
   static HWY_INLINE KeyVec step(Column& entering, const std::uint16_t*& gone, std::uint16_t*& kept,
                                 const Chunk<kVectors>& chunk, Vec* window) {
-    enter<kVectors, kPartners>(entering, chunk, window);
+    if constexpr (kPartners != Partners::kNone) enter<kVectors, kPartners>(entering, chunk, window);
     leave<kVectors>(gone, window);
     gone += entering.stride;
-    if constexpr (kPartners == Partners::kSome) {
+    if constexpr (are_looked_up(kPartners)) {
       store_in_order<kVectors>(window, kept);
       kept += entering.stride;
       Vec whole[kVectors];
@@ -571,7 +579,7 @@ class SadLanes {
       if (all_exist_) {
         change_columns<vectors(), Partners::kAll, kFresh>(lane, begin, end);
       } else {
-        change_columns<vectors(), Partners::kSome, kFresh>(lane, begin, end);
+        change_columns<vectors(), Partners::kSomePadded, kFresh>(lane, begin, end);
       }
     });
   }
@@ -594,11 +602,11 @@ class SadLanes {
     change_columns<kVectors, kPartners, false>(lane, end, columns_);
   }
 
-  /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole. Partners::kSome:
-  /// where the right picture's left end clips some, whose sums are kept.
+  /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole, or has lost as
+  /// many columns as the others (kNone). Where partners are looked up: where the right picture's left end clips some
+  /// windows, whose sums are kept.
   template <int kVectors, Partners kPartners, bool kFirst>
   HWY_INLINE void slide(int lane, int x, int size, BatchBest& best) const {
-    const Lanes lanes;
     const Chunk<kVectors> chunk(layout_, lane);
     Vec window[kVectors];
     load_sums<kVectors>(s_.window_sums.data() + lane, window);
@@ -619,7 +627,6 @@ class SadLanes {
   /// The same where anything may clip windows: all sums are kept, and only whole windows are offered.
   template <int kVectors, bool kFirst>
   HWY_INLINE void slide_clipped(int lane, int x, int size, BatchBest& best) const {
-    const Lanes lanes;
     const Chunk<kVectors> chunk(layout_, lane);
     Vec window[kVectors];
     load_sums<kVectors>(s_.window_sums.data() + lane, window);
@@ -629,7 +636,7 @@ class SadLanes {
     const WindowLimits* limits = s_.limits.data() + (x - layout_.first_column);
     std::uint16_t* kept = s_.batch_sums.data() + lane;
     for (int j = 0; j < size; ++j, entering.advance(), gone += stride, kept += stride) {
-      if (x + j < end_entering_) enter<kVectors, Partners::kSome>(entering, chunk, window);
+      if (x + j < end_entering_) enter<kVectors, Partners::kSomePadded>(entering, chunk, window);
       leave<kVectors>(gone, window);
       store_in_order<kVectors>(window, kept);
       Vec whole[kVectors];
@@ -642,16 +649,18 @@ class SadLanes {
     store_sums<kVectors>(window, s_.window_sums.data() + lane);
   }
 
-  void match_inner(int x, int size) noexcept {
+  /// Of all lanes; kPadded is what the first chunk's are where there is padding.
+  template <Partners kPartners, Partners kPadded>
+  void slide_all(int x, int size) noexcept {
     BatchBest& best = best_;
-    const bool padded = layout_.count != lanes_;
+    const bool padded = padding_ != 0;
     for_each_chunk(lanes_, [&](auto vectors, int lane, bool first) {
       if (!first) {
-        slide<vectors(), Partners::kAll, false>(lane, x, size, best);
+        slide<vectors(), kPartners, false>(lane, x, size, best);
       } else if (padded) {
-        slide<vectors(), Partners::kPadded, true>(lane, x, size, best);
+        slide<vectors(), kPadded, true>(lane, x, size, best);
       } else {
-        slide<vectors(), Partners::kAll, true>(lane, x, size, best);
+        slide<vectors(), kPartners, true>(lane, x, size, best);
       }
     });
   }
@@ -673,14 +682,7 @@ class SadLanes {
   }
 
   void match_ranked(int x, int size) noexcept {
-    BatchBest& best = best_;
-    for_each_chunk(lanes_, [&](auto vectors, int lane, bool first) {
-      if (first) {
-        slide<vectors(), Partners::kSome, true>(lane, x, size, best);
-      } else {
-        slide<vectors(), Partners::kSome, false>(lane, x, size, best);
-      }
-    });
+    slide_all<Partners::kSome, Partners::kSomePadded>(x, size);
     for (int j = 0; j < size; j += 4) choose_four(x + j, j);
   }
 
@@ -740,7 +742,7 @@ class SadLanes {
       if (all_exist_) {
         start_row<vectors(), Partners::kAll>(lane, span);
       } else {
-        start_row<vectors(), Partners::kSome>(lane, span);
+        start_row<vectors(), Partners::kSomePadded>(lane, span);
       }
     });
     const int end_ranked = std::min(ranked_end_, span.last + 1);
@@ -750,7 +752,10 @@ class SadLanes {
       nones_ = 0;
       if (layout_.is_inner(x) && size >= 4) {
         size = size / 4 * 4;
-        match_inner(x, size);
+        slide_all<Partners::kAll, Partners::kPadded>(x, size);
+      } else if (x >= end_entering_ && end_is_whole_ && size >= 4) {
+        size = size / 4 * 4;
+        slide_all<Partners::kNone, Partners::kNone>(x, size);
       } else if (x >= ranked_begin_ && end_ranked - x >= 4) {
         // The last four may have inner pixels, too.
         size = std::min((size + 3) / 4 * 4, (end_ranked - x) / 4 * 4);
@@ -825,10 +830,11 @@ class SadLanes {
   int padding_;   ///< of lanes_
   int smallest_;  ///< disparity of id 0, maybe of padding [px]
   int columns_;
-  int end_entering_;      ///< from this pixel on no column enters the window
-  bool all_exist_;        ///< each lane of each column has a partner
-  int slot_ = -1;         ///< of distances, of the row that enters
-  int ranked_begin_ = 0;  ///< pixels [begin, end) have RankedKeys
+  int end_entering_;          ///< from this pixel on no column enters the window
+  bool all_exist_;            ///< each lane of each column has a partner
+  bool end_is_whole_ = true;  ///< at the left picture's right end all windows of a pixel have as many columns
+  int slot_ = -1;             ///< of distances, of the row that enters
+  int ranked_begin_ = 0;      ///< pixels [begin, end) have RankedKeys
   int ranked_end_ = -1;
   int nones_ = 0;   ///< pixels of the batch without a candidate
   BatchBest best_;  ///< the batch's winners, ids as of Chunk; kNoId where there is no candidate

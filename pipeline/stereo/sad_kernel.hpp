@@ -35,7 +35,7 @@ struct SadCandidate {
 inline constexpr int kLargestSadLaneBlock = 15;
 
 /// Pixels between two chunks of lanes.
-inline constexpr int kSadPixelStep = 64;
+inline constexpr int kSadPixelStep = 128;
 
 /// How windows clipped at the left end of the right picture compare with the whole ones of the same left column, for
 /// blocks up to kLargestBlock: sum x weight + rank is the smaller, the smaller the mean; of equal means, the smaller
