@@ -64,10 +64,10 @@ struct LaneLayout {
 
   [[nodiscard]] bool is_inner(int x) const noexcept { return x >= inner_begin && x < inner_end; }
 
-  /// How many pixels from x to `last` are alike in that, at most kPixelStep.
-  [[nodiscard]] int batch(int x, int last) const noexcept {
+  /// How many pixels from x to `last` are alike in that, at most `most`.
+  [[nodiscard]] int batch(int x, int last, int most = kPixelStep) const noexcept {
     const int limit = x < inner_begin ? inner_begin : x < inner_end ? inner_end : last + 1;
-    return std::min({kPixelStep, limit - x, last + 1 - x});
+    return std::min({most, limit - x, last + 1 - x});
   }
 };
 

@@ -92,6 +92,11 @@ HWY_INLINE hn::Vec<FourKeys> fold_blocks(D /*tag*/, hn::Vec<D> v) {
 /// The smallest key of each of four vectors: halves of two vectors are put side by side and the smaller kept.
 template <class V>
 HWY_INLINE hn::Vec<FourKeys> smallest_of_each(V a, V b, V c, V d) {
+#if HWY_ARCH_ARM_A64
+  if constexpr (hn::MaxLanes(hn::DFromV<V>()) == 4) {
+    return V(vpminq_u32(vpminq_u32(a.raw, b.raw), vpminq_u32(c.raw, d.raw)));
+  }
+#endif
   const hn::DFromV<V> keys;
   const hn::Repartition<std::uint64_t, hn::DFromV<V> > pairs;
   const V ab = hn::Min(hn::InterleaveLower(keys, a, b), hn::InterleaveUpper(keys, a, b));
@@ -101,47 +106,6 @@ HWY_INLINE hn::Vec<FourKeys> smallest_of_each(V a, V b, V c, V d) {
   return fold_blocks(keys, hn::Min(hn::BitCast(keys, hn::InterleaveLower(pairs, ab_pairs, cd_pairs)),
                                    hn::BitCast(keys, hn::InterleaveUpper(pairs, ab_pairs, cd_pairs))));
 }
-
-/// The best lanes of a batch's pixels.
-struct BatchBest {
-  static constexpr int kKeys = kVector / 2;
-  HWY_ALIGN std::uint32_t lanes[kBatch * kKeys];  ///< a vector of keys for each pixel
-  HWY_ALIGN std::uint32_t keys[kBatch];           ///< the smallest of each
-
-  template <bool kFirst>
-  HWY_INLINE void offer(int pixel, KeyVec offered) {
-    std::uint32_t* at = lanes + pixel * kKeys;
-    if constexpr (!kFirst) offered = hn::Min(offered, hn::Load(Keys(), at));
-    hn::Store(offered, Keys(), at);
-  }
-
-  /// Of the first `pixels`, rounded up to fours.
-  HWY_INLINE void find(int pixels) {
-    for (int j = 0; j < pixels; j += 4) {
-      const auto vector = [&](int pixel) HWY_ATTR { return hn::Load(Keys(), lanes + (j + pixel) * kKeys); };
-      hn::Store(smallest_of_each(vector(0), vector(1), vector(2), vector(3)), FourKeys(), keys + j);
-    }
-  }
-
-  /// The first `pixels` ids as disparities.
-  HWY_INLINE void disparities(int smallest, int pixels, std::uint16_t* HWY_RESTRICT out) const {
-    static_assert(kDisparityScale == 16);
-    const FourKeys four;
-    const hn::Rebind<std::int32_t, FourKeys> as_signed;
-    const hn::Rebind<std::uint16_t, FourKeys> narrow;
-    const auto id_only = hn::Set(four, 0xFFFFU);
-    const auto first = hn::Set(four, static_cast<std::uint32_t>(smallest));
-    int j = 0;
-    for (; j + 4 <= pixels; j += 4) {
-      const auto d = hn::ShiftLeft<4>(hn::Add(hn::And(hn::Load(four, keys + j), id_only), first));
-      hn::StoreU(hn::DemoteTo(narrow, hn::BitCast(as_signed, d)), narrow, out + j);
-    }
-    for (; j < pixels; ++j) out[j] = static_cast<std::uint16_t>((smallest + id(j)) * kDisparityScale);
-  }
-
-  [[nodiscard]] std::uint16_t value(int pixel) const { return static_cast<std::uint16_t>(keys[pixel] >> 16); }
-  [[nodiscard]] std::uint16_t id(int pixel) const { return static_cast<std::uint16_t>(keys[pixel]); }
-};
 
 #endif  // HWY_TARGET != HWY_SCALAR
 

@@ -39,8 +39,8 @@ using Bytes = hn::CappedTag<std::uint8_t, static_cast<std::size_t>(kVectors >= 2
 
 template <class D, class V>
 HWY_INLINE V distance(D /*tag*/, V a, V b) {
-#if HWY_ARCH_ARM
-  return hn::Sub(hn::Max(a, b), hn::Min(a, b));  // one instruction there
+#if HWY_ARCH_ARM_A64
+  return V(vabdq_u8(a.raw, b.raw));  // Highway has no name for it yet
 #else
   return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
 #endif
@@ -86,50 +86,173 @@ HWY_INLINE V8 ordered(V8 bytes) {
   return bytes;
 }
 
-/// (entering - leaving), or twice that, as lanes of 16 bits modulo 2^16: one vector or two.
+#if HWY_ARCH_ARM_A64
+HWY_INLINE uint8x16x4_t load_four(const std::uint8_t* from) { return vld1q_u8_x4(from); }
+#endif
+
+/// Adds entering - leaving, or twice that, to lanes of 16 bits modulo 2^16: one vector or two.
 template <int kVectors, bool kTwice, class V8>
-HWY_INLINE void subtract(V8 entering, V8 leaving, Vec* difference) {
+HWY_INLINE void change(V8 entering, V8 leaving, Vec* sums) {
   const Lanes lanes;
   if constexpr (kVectors == 1) {
     const Vec once = hn::Sub(hn::PromoteTo(lanes, entering), hn::PromoteTo(lanes, leaving));
-    difference[0] = kTwice ? hn::Add(once, once) : once;
+    sums[0] = hn::Add(sums[0], kTwice ? hn::Add(once, once) : once);
   } else {
 #if HWY_ARCH_X86
     const Bytes<kVectors> bytes;
     const hn::Repartition<std::uint16_t, Bytes<kVectors> > pairs;
     const hn::RebindToSigned<Bytes<kVectors> > as_signed;
     const auto weights = hn::BitCast(as_signed, hn::Set(pairs, kTwice ? 0xFE02 : 0xFF01));
-    difference[0] = weigh_pairs(hn::InterleaveLower(bytes, entering, leaving), weights);
-    difference[1] = weigh_pairs(hn::InterleaveUpper(bytes, entering, leaving), weights);
+    sums[0] = hn::Add(sums[0], weigh_pairs(hn::InterleaveLower(bytes, entering, leaving), weights));
+    sums[1] = hn::Add(sums[1], weigh_pairs(hn::InterleaveUpper(bytes, entering, leaving), weights));
+#elif HWY_ARCH_ARM_A64
+    const uint8x16_t weight = vdupq_n_u8(kTwice ? 2 : 1);
+    const auto half = [](uint8x16_t v) HWY_ATTR { return vget_low_u8(v); };
+    sums[0] = Vec(vmlsl_u8(vmlal_u8(sums[0].raw, half(entering.raw), half(weight)), half(leaving.raw), half(weight)));
+    sums[1] = Vec(vmlsl_high_u8(vmlal_high_u8(sums[1].raw, entering.raw, weight), leaving.raw, weight));
 #else
     static_assert(!kTwice);
     const hn::Half<Bytes<kVectors> > half;
-    difference[0] = hn::Sub(hn::PromoteTo(lanes, hn::LowerHalf(half, entering)),
-                            hn::PromoteTo(lanes, hn::LowerHalf(half, leaving)));
-    difference[1] = hn::Sub(hn::PromoteTo(lanes, hn::UpperHalf(half, entering)),
-                            hn::PromoteTo(lanes, hn::UpperHalf(half, leaving)));
+    const auto add = [&](Vec sum, auto in, auto out) HWY_ATTR {
+      return hn::Add(sum, hn::Sub(hn::PromoteTo(lanes, in), hn::PromoteTo(lanes, out)));
+    };
+    sums[0] = add(sums[0], hn::LowerHalf(half, entering), hn::LowerHalf(half, leaving));
+    sums[1] = add(sums[1], hn::UpperHalf(half, entering), hn::UpperHalf(half, leaving));
 #endif
   }
 }
 
-/// A row of greys, each four times in 32 bits: what fills a vector of bytes fastest.
-HWY_INLINE void four_of_each(const std::uint8_t* HWY_RESTRICT in, int count, std::uint32_t* HWY_RESTRICT out) {
+/// The vectors that begin at `from`.
+template <int kCount, class D>
+HWY_INLINE void load(D d, const hn::TFromD<D>* from, hn::Vec<D>* to) {
+#if HWY_ARCH_ARM_A64
+  // One instruction for four of them.
+  if constexpr (kCount >= 4 && hn::MaxLanes(D()) * sizeof(hn::TFromD<D>) == 16) {
+    for (int i = 0; i < kCount; i += 4, from += 4 * hn::MaxLanes(D())) {
+      const auto four = load_four(from);
+      for (int k = 0; k < 4; ++k) to[i + k] = hn::Vec<D>(four.val[k]);
+    }
+    return;
+  }
+#endif
+  for (int i = 0; i < kCount; ++i) to[i] = hn::LoadU(d, from + static_cast<std::size_t>(i) * hn::MaxLanes(D()));
+}
+
+/// Sums from and to memory. Unrolled by hand: what is indexed by a variable anywhere stands in memory everywhere.
+template <int kCount>
+HWY_INLINE void load_sums(const std::uint16_t* from, Vec* to) {
+  if constexpr (kCount > 0) {
+    load_sums<kCount - 1>(from, to);
+    to[kCount - 1] = hn::Load(Lanes(), from + (kCount - 1) * kVector);
+  }
+}
+template <int kCount>
+HWY_INLINE void store_sums(const Vec* from, std::uint16_t* to) {
+  if constexpr (kCount > 0) {
+    store_sums<kCount - 1>(from, to);
+    hn::Store(from[kCount - 1], Lanes(), to + (kCount - 1) * kVector);
+  }
+}
+
+#if HWY_ARCH_ARM_A64
+/// A grey as it fills a vector of bytes fastest.
+using Grey = std::uint8_t;
+HWY_INLINE std::uint8_t* left_greys(SadScratch& s) { return s.left_bytes.data(); }
+HWY_INLINE void copy_greys(const std::uint8_t* HWY_RESTRICT in, int count, Grey* HWY_RESTRICT out) {
+  std::copy_n(in, count, out);
+}
+#else
+/// A grey as it fills a vector of bytes fastest: four times.
+using Grey = std::uint32_t;
+HWY_INLINE std::uint32_t* left_greys(SadScratch& s) { return s.left_greys.data(); }
+HWY_INLINE void copy_greys(const std::uint8_t* HWY_RESTRICT in, int count, Grey* HWY_RESTRICT out) {
   constexpr std::uint32_t kFour = 0x01010101;
   const hn::Rebind<std::uint8_t, Keys> bytes;
   constexpr int kStep = static_cast<int>(hn::MaxLanes(Keys()));
-  int i = 0;
-  for (; i + kStep <= count; i += kStep) {
+  const auto copy = [&](int i) HWY_ATTR {
     hn::StoreU(hn::Mul(hn::PromoteTo(Keys(), hn::LoadU(bytes, in + i)), hn::Set(Keys(), kFour)), Keys(), out + i);
-  }
+  };
+  int i = 0;
+  for (; i + kStep <= count; i += kStep) copy(i);
+  if (i == count) return;
+  if (count >= kStep) return copy(count - kStep);
   for (; i < count; ++i) out[i] = in[i] * kFour;
 }
+#endif
+
+/// The best lanes of a batch's pixels.
+struct BatchBest {
+  static constexpr int kKeys = kVector / 2;
+  HWY_ALIGN std::uint32_t lanes[kSadPixelStep * kKeys];  ///< a vector of keys for each pixel
+  HWY_ALIGN std::uint32_t keys[kSadPixelStep];           ///< the smallest of each
+
+  template <bool kFirst>
+  HWY_INLINE void offer(int pixel, KeyVec offered) {
+    std::uint32_t* at = lanes + pixel * kKeys;
+    if constexpr (!kFirst) offered = hn::Min(offered, hn::Load(Keys(), at));
+    hn::Store(offered, Keys(), at);
+  }
+
+  /// Of the first `pixels`, rounded up to fours.
+  HWY_INLINE void find(int pixels) {
+    for (int j = 0; j < pixels; j += 4) {
+      const auto vector = [&](int pixel) HWY_ATTR { return hn::Load(Keys(), lanes + (j + pixel) * kKeys); };
+      hn::Store(smallest_of_each(vector(0), vector(1), vector(2), vector(3)), FourKeys(), keys + j);
+    }
+  }
+
+  /// Ids from `pixel` on, as many as d has; those that are larger as kLargestId.
+  static constexpr std::uint16_t kLargestId = 0x7FFF;
+  using Eight = hn::Full128<std::uint16_t>;
+  using Four = hn::Half<Eight>;
+  [[nodiscard]] HWY_INLINE hn::Vec<Eight> ids(Eight d, int pixel) const { return narrow(d, pixel, pixel + 4); }
+  [[nodiscard]] HWY_INLINE hn::Vec<Four> ids(Four /*d*/, int pixel) const {
+    return hn::LowerHalf(narrow(Eight(), pixel, pixel));
+  }
+
+  template <class D, class V>
+  [[nodiscard]] static HWY_INLINE V disparity(D d, V id, int smallest) {
+    static_assert(kDisparityScale == 16);
+    return hn::ShiftLeft<4>(hn::Add(id, hn::Set(d, static_cast<std::uint16_t>(smallest))));
+  }
+
+  /// The first `pixels` ids as disparities.
+  HWY_INLINE void disparities(int smallest, int pixels, std::uint16_t* HWY_RESTRICT out) const {
+    const auto write = [&](auto d, int j) HWY_ATTR { hn::StoreU(disparity(d, ids(d, j), smallest), d, out + j); };
+    int j = 0;
+    for (; j + 8 <= pixels; j += 8) write(Eight(), j);
+    if (j + 4 <= pixels) {
+      write(Four(), j);
+      j += 4;
+    }
+    for (; j < pixels; ++j) out[j] = static_cast<std::uint16_t>((smallest + id(j)) * kDisparityScale);
+  }
+
+  [[nodiscard]] std::uint16_t id(int pixel) const { return static_cast<std::uint16_t>(keys[pixel]); }
+
+ private:
+  [[nodiscard]] HWY_INLINE hn::Vec<Eight> narrow(Eight eight, int first, int second) const {
+    const FourKeys four;
+    const hn::Repartition<std::int32_t, FourKeys> as_signed;
+    const auto four_ids = [&](int pixel) HWY_ATTR {
+      return hn::BitCast(as_signed, hn::And(hn::Load(four, keys + pixel), hn::Set(four, 0xFFFFU)));
+    };
+    // Vectors of 128 bits stay in order.
+    return hn::BitCast(
+        eight, hn::ReorderDemote2To(hn::Repartition<std::int16_t, FourKeys>(), four_ids(first), four_ids(second)));
+  }
+};
 
 /// Which partners a pass meets.
 enum class Partners {
-  kAll,     ///< every lane has one
-  kPadded,  ///< every lane that is not padding
-  kSome,    ///< they are looked up
+  kAll,         ///< every lane has one
+  kPadded,      ///< every lane that is not padding
+  kSome,        ///< they are looked up
+  kSomePadded,  ///< likewise, and there is padding
+  kNone,        ///< no column enters
 };
+constexpr bool are_looked_up(Partners p) { return p == Partners::kSome || p == Partners::kSomePadded; }
+constexpr bool are_padded(Partners p) { return p == Partners::kPadded || p == Partners::kSomePadded; }
 
 /// kPairs: sums are kept twice as large, and bit 0 says in which half of its chunk a lane stands: then the smaller of
 /// two lanes, one of each half, knows where it comes from. Where instructions for it are at hand and 16 bits hold it.
@@ -145,26 +268,40 @@ class SadLanes {
         lanes_(layout_.lanes),
         padding_(lanes_ - layout_.count),
         smallest_(task.geometry.range.min - padding_),
-        columns_(layout_.columns) {}
+        columns_(layout_.columns),
+        end_entering_(layout_.first_column + columns_ - radius_),
+        all_exist_(padding_ == 0 && layout_.first_partner == 0 && layout_.end_partner == layout_.partners) {}
 
   [[nodiscard]] DisparityCounts run() noexcept {
     const Rect& box = task_.wanted.box;
     const int height = task_.left.height;
     const int first_row = std::max(box.top - radius_, 0);
-    std::fill_n(s_.column_sums.data(), std::ptrdiff_t{columns_ + 1} * lanes_, std::uint16_t{0});
-    std::fill_n(s_.distances.data(), std::ptrdiff_t{block_} * columns_ * lanes_, std::uint8_t{0});
+    std::fill_n(s_.column_sums.data(), std::ptrdiff_t{before() + columns_} * lanes_, std::uint16_t{0});
     std::fill_n(s_.partner_exists.data(), layout_.partners, std::uint8_t{0});
     std::fill_n(s_.partner_exists.data() + layout_.first_partner, layout_.end_partner - layout_.first_partner,
                 std::uint8_t{0xFF});
+    const int end_clipped = std::clamp(radius_ - layout_.partner, 0, layout_.partners);
+    std::fill_n(s_.partner_clips.data(), end_clipped, std::uint8_t{0xFF});
+    std::fill_n(s_.partner_clips.data() + end_clipped, layout_.partners - end_clipped, std::uint8_t{0});
     std::fill_n(s_.right_greys.data(), layout_.partners, std::uint8_t{0});
     for (int x = box.left; x < box.right(); ++x) {
       const auto i = static_cast<std::size_t>(x - layout_.first_column);
       s_.limits[i] = WindowLimits(task_.geometry, x);
       rank(x, s_.limits[i]);
     }
-    for (int y = first_row; y < std::min(box.top + radius_, height); ++y) {
+    ranked_end_ = std::min(ranked_end_, end_entering_);
+    for (int x = std::max(end_entering_, box.left); x < box.right(); ++x) {
+      const WindowLimits& limits = s_.limits[static_cast<std::size_t>(x - layout_.first_column)];
+      end_is_whole_ = end_is_whole_ && limits.first_whole == 0 && limits.end_whole == layout_.count;
+    }
+    // The first rows take the place of none; of other rows there were zeros.
+    const int end_fresh = std::min(box.top + radius_, height);
+    const std::ptrdiff_t row_size = std::ptrdiff_t{columns_} * lanes_;
+    const int fresh = end_fresh - first_row;
+    std::fill_n(s_.distances.data() + fresh * row_size, (block_ - fresh) * row_size, std::uint8_t{0});
+    for (int y = first_row; y < end_fresh; ++y) {
       read_row(y);
-      for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { change_columns<vectors()>(lane, 0, columns_); });
+      enter_columns<true>(0, columns_);
     }
     for (int y = box.top; y < box.bottom(); ++y) {
       read_row(y + radius_);
@@ -176,15 +313,18 @@ class SadLanes {
  private:
   /// RankedKeys of a column, where it can have them; such columns stand side by side.
   void rank(int x, const WindowLimits& limits) noexcept {
-    const int clipped = limits.end - limits.end_whole;
-    if (block_ > RankedKeys::kLargestBlock || limits.first != limits.first_whole ||
-        limits.first_whole == limits.end_whole || clipped >= RankedKeys::kRanks) {
+    const BlockGeometry& g = task_.geometry;
+    // In the leftmost columns the left picture's end clips windows, too: for partner_clips they are all clipped.
+    const int end_whole =
+        std::clamp(x - radius_ - g.offset + 1 - g.range.min, int{limits.first_whole}, int{limits.end});
+    const int clipped = limits.end - end_whole;
+    if (block_ > RankedKeys::kLargestBlock || limits.first != limits.first_whole || limits.first == limits.end ||
+        clipped >= RankedKeys::kRanks) {
       return;
     }
     if (ranked_end_ != x) ranked_begin_ = x;
     ranked_end_ = x + 1;
     const auto i = static_cast<std::size_t>(x - layout_.first_column);
-    const BlockGeometry& g = task_.geometry;
     RankedKeys& ranked = s_.ranked[i];
     ranked.lane = layout_.count - limits.end;
     for (int slot = 0; slot < RankedKeys::kRanks; ++slot) {
@@ -192,9 +332,12 @@ class SadLanes {
       ranked.weights[slot] = exists ? RankedKeys::weight(g.columns(x, g.range.min + limits.end - 1 - slot)) : 0;
       ranked.ranks[slot] = exists ? static_cast<std::uint32_t>(clipped - slot) : ~0U;
     }
-    s_.whole_weights[i] = RankedKeys::weight(g.columns(x));
-    s_.rank_zero[i] = static_cast<std::uint32_t>(limits.end_whole - 1 + padding_);
+    s_.whole_weights[i] = end_whole == limits.first ? RankedKeys::kNoWeight : RankedKeys::weight(g.columns(x));
+    s_.rank_zero[i] = static_cast<std::uint32_t>(end_whole - 1 + padding_);
   }
+
+  /// Columns of zeros before the first.
+  [[nodiscard]] int before() const { return radius_ + 1; }
 
   /// Sums of a chunk as keys carry the bit that is taken out here: (2 sum + upper) << 16 | id becomes
   /// 2 sum << 16 | id + upper * half a chunk, so that keys of several chunks are comparable.
@@ -212,6 +355,14 @@ class SadLanes {
 
   /// Of a comparable key.
   [[nodiscard]] static std::uint32_t sum_of(std::uint32_t key) { return key >> (kPairs ? 17 : 16); }
+
+  template <int kCount>
+  static HWY_INLINE void mark_each(const Vec* marks, Vec* window) {
+    if constexpr (kCount > 0) {
+      mark_each<kCount - 1>(marks, window);
+      window[kCount - 1] = hn::Or(window[kCount - 1], marks[kCount - 1]);
+    }
+  }
 
   /// What the passes over a chunk of lanes know.
   template <int kVectors>
@@ -249,10 +400,10 @@ class SadLanes {
     const int existing = layout_.end_partner - layout_.first_partner;
     std::uint8_t* right = s_.right_greys.data() + layout_.first_partner;
     if (y < task_.left.height) {
-      four_of_each(task_.left.row(y) + layout_.first_column, columns_, s_.left_greys.data());
+      copy_greys(task_.left.row(y) + layout_.first_column, columns_, left_greys(s_));
       std::copy_n(task_.right.row(y) + layout_.partner + layout_.first_partner, existing, right);
     } else {
-      std::fill_n(s_.left_greys.data(), columns_, 0U);
+      std::fill_n(left_greys(s_), columns_, Grey{0});
       std::fill_n(right, existing, std::uint8_t{0});
     }
   }
@@ -260,53 +411,72 @@ class SadLanes {
   /// Where a column and its partners stand. A copy by value: what lies behind pointers of pointers would be read again
   /// after each store.
   struct Column {
-    const std::uint32_t* left;
+    const Grey* left;
     const std::uint8_t* right;
     const std::uint8_t* exists;
+    const std::uint8_t* clips;
     std::uint8_t* distances;
     std::uint16_t* sums;
     std::ptrdiff_t stride;
 
     HWY_INLINE void advance() {
-      ++left, ++right, ++exists;
+      ++left, ++right, ++exists, ++clips;
       distances += stride, sums += stride;
     }
   };
 
   [[nodiscard]] HWY_INLINE Column column(int i, int lane) const {
     const std::ptrdiff_t at = std::ptrdiff_t{i} + lane;
-    return {s_.left_greys.data() + i,
+    return {left_greys(s_) + i,
             s_.right_greys.data() + at,
             s_.partner_exists.data() + at,
+            s_.partner_clips.data() + at - radius_,
             s_.distances.data() + (std::ptrdiff_t{slot_} * columns_ + i) * lanes_ + lane,
-            s_.column_sums.data() + std::ptrdiff_t{i + 1} * lanes_ + lane,
+            s_.column_sums.data() + std::ptrdiff_t{before() + i} * lanes_ + lane,
             lanes_};
   }
+  /// The column that the window of pixel x loses.
+  [[nodiscard]] HWY_INLINE const std::uint16_t* column_before(int x, int lane) const {
+    return s_.column_sums.data() + std::ptrdiff_t{before() + x - radius_ - 1 - layout_.first_column} * lanes_ + lane;
+  }
 
-  /// Brings a column's sums to the new row and adds them to the window's.
-  template <int kVectors, Partners kPartners>
+  /// Brings a column's sums to the new row and adds them to the window's. kFresh: no row leaves.
+  template <int kVectors, Partners kPartners, bool kFresh = false>
   static HWY_INLINE void enter(const Column& at, const Chunk<kVectors>& chunk, Vec* window) {
     const Lanes lanes;
     const Bytes<kVectors> bytes;
     constexpr int kStep = static_cast<int>(hn::MaxLanes(Bytes<kVectors>())) / kVector;
-    const hn::Repartition<std::uint32_t, Bytes<kVectors> > fours;
-    const auto left = hn::BitCast(bytes, hn::Set(fours, *at.left));
-    for (int k = 0; k < kVectors; k += kStep) {
-      auto entering = distance(bytes, left, hn::LoadU(bytes, at.right + k * kVector));
-      if constexpr (kPartners == Partners::kSome)
-        entering = hn::And(entering, hn::LoadU(bytes, at.exists + k * kVector));
-      if constexpr (kPartners != Partners::kAll) entering = hn::And(entering, chunk.partners[k]);
-      entering = ordered<kVectors>(entering);
-      std::uint8_t* kept = at.distances + k * kVector;
-      Vec change[2];
-      subtract<kVectors, kPairs>(entering, hn::LoadU(bytes, kept), change);
-      hn::StoreU(entering, bytes, kept);
-      for (int i = 0; i < kStep; ++i) {
-        std::uint16_t* sums = at.sums + (k + i) * kVector;
-        const Vec sum = hn::Add(hn::Load(lanes, sums), change[i]);
-        hn::Store(sum, lanes, sums);
-        window[k + i] = hn::Add(window[k + i], sum);
+    const auto left = hn::BitCast(bytes, hn::Set(hn::Repartition<Grey, Bytes<kVectors> >(), *at.left));
+    constexpr int kBytes = kVectors / kStep;
+    hn::Vec<Bytes<kVectors> > entering[kBytes];
+    hn::Vec<Bytes<kVectors> > leaving[kBytes];
+    load<kBytes>(bytes, at.right, entering);
+    for (int i = 0; i < kBytes; ++i) entering[i] = distance(bytes, left, entering[i]);
+    if constexpr (are_looked_up(kPartners)) {
+      hn::Vec<Bytes<kVectors> > exists[kBytes];
+      load<kBytes>(bytes, at.exists, exists);
+      for (int i = 0; i < kBytes; ++i) entering[i] = hn::And(entering[i], exists[i]);
+    }
+    if constexpr (are_padded(kPartners)) {
+      for (int i = 0; i < kBytes; ++i) entering[i] = hn::And(entering[i], chunk.partners[i * kStep]);
+    }
+    for (int i = 0; i < kBytes; ++i) entering[i] = ordered<kVectors>(entering[i]);
+    if constexpr (kFresh) {
+      for (int i = 0; i < kBytes; ++i) leaving[i] = hn::Zero(bytes);
+    } else {
+      load<kBytes>(bytes, at.distances, leaving);
+    }
+    for (int i = 0; i < kBytes; ++i) hn::StoreU(entering[i], bytes, at.distances + i * kStep * kVector);
+    // Four at a time: neighbours are read and written in one instruction where there is such a one.
+    constexpr int kFew = std::min(kVectors, 4);
+    for (int k = 0; k < kVectors; k += kFew) {
+      Vec sums[kFew];
+      for (int i = 0; i < kFew; ++i) sums[i] = hn::Load(lanes, at.sums + (k + i) * kVector);
+      for (int i = 0; i < kFew; i += kStep) {
+        change<kVectors, kPairs>(entering[(k + i) / kStep], leaving[(k + i) / kStep], sums + i);
       }
+      for (int i = 0; i < kFew; ++i) hn::Store(sums[i], lanes, at.sums + (k + i) * kVector);
+      for (int i = 0; i < kFew; ++i) window[k + i] = hn::Add(window[k + i], sums[i]);
     }
   }
 
@@ -330,62 +500,6 @@ class SadLanes {
     return keys_of(smallest, id);
   }
 
-  /// Columns [begin, end) of the region.
-  template <int kVectors>
-  HWY_INLINE void change_columns(int lane, int begin, int end) const {
-    if (begin >= end) return;
-    const Chunk<kVectors> chunk(layout_, lane);
-    Vec unused[kVectors];
-    for (int k = 0; k < kVectors; ++k) unused[k] = hn::Zero(Lanes());
-    Column at = column(begin, lane);
-    for (int i = begin; i < end; ++i, at.advance()) enter<kVectors, Partners::kSome>(at, chunk, unused);
-  }
-
-  /// The window just left of the row's first pixel, and all columns that the row's windows do not reach.
-  template <int kVectors>
-  HWY_INLINE void start_row(int lane, Span span) const {
-    const Lanes lanes;
-    const Chunk<kVectors> chunk(layout_, lane);
-    const int begin = std::max(span.first - radius_, 0) - layout_.first_column;
-    const int middle = std::min(span.first + radius_ - layout_.first_column, columns_);
-    const int end = std::min(span.last + radius_ + 1 - layout_.first_column, columns_);
-    change_columns<kVectors>(lane, 0, begin);
-    // The column before the first is what the first pixel's window loses; before the region's first stand zeros.
-    const std::uint16_t* before = s_.column_sums.data() + std::ptrdiff_t{begin} * lanes_ + lane;
-    Vec window[kVectors];
-    for (int k = 0; k < kVectors; ++k) window[k] = hn::Or(hn::Load(lanes, before + k * kVector), chunk.marks[k]);
-    Column at = column(begin, lane);
-    for (int i = begin; i < middle; ++i, at.advance()) enter<kVectors, Partners::kSome>(at, chunk, window);
-    for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
-    change_columns<kVectors>(lane, end, columns_);
-  }
-
-  /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole.
-  template <int kVectors, Partners kPartners, bool kFirst>
-  HWY_INLINE void slide(int lane, int x, int size, BatchBest& best) const {
-    const Lanes lanes;
-    const Chunk<kVectors> chunk(layout_, lane);
-    Vec window[kVectors];
-    for (int k = 0; k < kVectors; ++k) window[k] = hn::Load(lanes, s_.window_sums.data() + lane + k * kVector);
-    Column entering = column(x + radius_ - layout_.first_column, lane);
-    const std::uint16_t* gone =
-        s_.column_sums.data() + std::ptrdiff_t{x - radius_ - layout_.first_column} * lanes_ + lane;
-    const std::ptrdiff_t stride = lanes_;
-    for (int j = 0; j < size; j += 4) {
-      KeyVec keys[4];
-      for (int i = 0; i < 4; ++i, entering.advance(), gone += stride) {
-        enter<kVectors, kPartners>(entering, chunk, window);
-        leave<kVectors>(gone, window);
-        keys[i] = best_keys<kVectors>(chunk, window);
-      }
-      const FourKeys four;
-      auto found = comparable<kVectors>(four, smallest_of_each(keys[0], keys[1], keys[2], keys[3]));
-      if constexpr (!kFirst) found = hn::Min(found, hn::Load(four, best.keys + j));
-      hn::Store(found, four, best.keys + j);
-    }
-    for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
-  }
-
   /// Sums of a chunk, lanes in their order.
   template <int kVectors>
   static HWY_INLINE void store_in_order(const Vec* sums, std::uint16_t* to) {
@@ -403,24 +517,127 @@ class SadLanes {
     }
   }
 
-  /// The same where windows may be clipped: all sums are kept, and only whole windows are offered.
-  template <int kVectors, bool kFirst>
-  HWY_INLINE void slide_clipped(int lane, int x, int size, BatchBest& best) const {
+  /// Moves the window to the next pixel, and finds the best keys of whole windows there. Where partners are looked up
+  /// all sums are kept, too.
+  template <int kVectors, Partners kPartners>
+  static HWY_INLINE KeyVec step(Column& entering, const std::uint16_t*& gone, std::uint16_t*& kept,
+                                const Chunk<kVectors>& chunk, Vec* window) {
+    if constexpr (kPartners != Partners::kNone) enter<kVectors, kPartners>(entering, chunk, window);
+    leave<kVectors>(gone, window);
+    gone += entering.stride;
+    if constexpr (are_looked_up(kPartners)) {
+      store_in_order<kVectors>(window, kept);
+      kept += entering.stride;
+      Vec whole[kVectors];
+      for (int k = 0; k < kVectors; ++k) whole[k] = window[k];
+      exclude<kVectors>(entering.clips, whole);
+      entering.advance();
+      return best_keys<kVectors>(chunk, whole);
+    } else {
+      entering.advance();
+      return best_keys<kVectors>(chunk, window);
+    }
+  }
+
+  /// Lanes whose byte is 0xFF.
+  template <int kVectors>
+  static HWY_INLINE void exclude(const std::uint8_t* clips, Vec* sums) {
+    const Bytes<kVectors> bytes;
     const Lanes lanes;
+    if constexpr (kVectors == 1) {
+      const hn::RebindToSigned<Lanes> as_signed;
+      const auto wide = hn::PromoteTo(as_signed, hn::BitCast(hn::RebindToSigned<Bytes<1> >(), hn::LoadU(bytes, clips)));
+      sums[0] = hn::Or(sums[0], hn::BitCast(lanes, wide));
+    } else {
+      constexpr int kStep = static_cast<int>(hn::MaxLanes(Bytes<kVectors>())) / kVector;
+      static_assert(kStep == 2);
+      hn::Vec<Bytes<kVectors> > vectors[kVectors / kStep];
+      load<kVectors / kStep>(bytes, clips, vectors);
+      for (int k = 0; k < kVectors; k += kStep) {
+        const auto clipped = ordered<kVectors>(vectors[k / kStep]);
+        sums[k] = hn::Or(sums[k], hn::BitCast(lanes, hn::InterleaveLower(bytes, clipped, clipped)));
+        sums[k + 1] = hn::Or(sums[k + 1], hn::BitCast(lanes, hn::InterleaveUpper(bytes, clipped, clipped)));
+      }
+    }
+  }
+
+  /// Columns [begin, end) of the region.
+  template <int kVectors, Partners kPartners, bool kFresh>
+  HWY_INLINE void change_columns(int lane, int begin, int end) const {
+    if (begin >= end) return;
+    const Chunk<kVectors> chunk(layout_, lane);
+    Column at = column(begin, lane);
+    for (int i = begin; i < end; ++i, at.advance()) {
+      Vec unused[kVectors];
+      for (int k = 0; k < kVectors; ++k) unused[k] = hn::Zero(Lanes());
+      enter<kVectors, kPartners, kFresh>(at, chunk, unused);
+    }
+  }
+  template <bool kFresh>
+  void enter_columns(int begin, int end) const {
+    for_each_chunk(lanes_, [&](auto vectors, int lane, bool) {
+      if (all_exist_) {
+        change_columns<vectors(), Partners::kAll, kFresh>(lane, begin, end);
+      } else {
+        change_columns<vectors(), Partners::kSomePadded, kFresh>(lane, begin, end);
+      }
+    });
+  }
+
+  /// The window just left of the row's first pixel, and all columns that the row's windows do not reach.
+  template <int kVectors, Partners kPartners>
+  HWY_INLINE void start_row(int lane, Span span) const {
+    const Chunk<kVectors> chunk(layout_, lane);
+    const int begin = std::max(span.first - radius_, 0) - layout_.first_column;
+    const int middle = std::min(span.first + radius_ - layout_.first_column, columns_);
+    const int end = std::min(span.last + radius_ + 1 - layout_.first_column, columns_);
+    change_columns<kVectors, kPartners, false>(lane, 0, begin);
+    // The column before the first is what the first pixel's window loses; before the region's first stand zeros.
+    Vec window[kVectors];
+    load_sums<kVectors>(column_before(begin + radius_ + layout_.first_column, lane), window);
+    mark_each<kVectors>(chunk.marks, window);
+    Column at = column(begin, lane);
+    for (int i = begin; i < middle; ++i, at.advance()) enter<kVectors, kPartners>(at, chunk, window);
+    store_sums<kVectors>(window, s_.window_sums.data() + lane);
+    change_columns<kVectors, kPartners, false>(lane, end, columns_);
+  }
+
+  /// Moves the window over `size` pixels, fours, from x on, where every disparity's window is whole, or has lost as
+  /// many columns as the others (kNone). Where partners are looked up: where the right picture's left end clips some
+  /// windows, whose sums are kept.
+  template <int kVectors, Partners kPartners, bool kFirst>
+  HWY_INLINE void slide(int lane, int x, int size, BatchBest& best) const {
     const Chunk<kVectors> chunk(layout_, lane);
     Vec window[kVectors];
-    for (int k = 0; k < kVectors; ++k) window[k] = hn::Load(lanes, s_.window_sums.data() + lane + k * kVector);
+    load_sums<kVectors>(s_.window_sums.data() + lane, window);
     Column entering = column(x + radius_ - layout_.first_column, lane);
-    const std::uint16_t* gone =
-        s_.column_sums.data() + std::ptrdiff_t{x - radius_ - layout_.first_column} * lanes_ + lane;
+    const std::uint16_t* gone = column_before(x, lane);
+    std::uint16_t* kept = s_.batch_sums.data() + lane;
+    for (int j = 0; j < size; j += 4) {
+      KeyVec keys[4];
+      for (int i = 0; i < 4; ++i) keys[i] = step<kVectors, kPartners>(entering, gone, kept, chunk, window);
+      const FourKeys four;
+      auto found = comparable<kVectors>(four, smallest_of_each(keys[0], keys[1], keys[2], keys[3]));
+      if constexpr (!kFirst) found = hn::Min(found, hn::Load(four, best.keys + j));
+      hn::Store(found, four, best.keys + j);
+    }
+    store_sums<kVectors>(window, s_.window_sums.data() + lane);
+  }
+
+  /// The same where anything may clip windows: all sums are kept, and only whole windows are offered.
+  template <int kVectors, bool kFirst>
+  HWY_INLINE void slide_clipped(int lane, int x, int size, BatchBest& best) const {
+    const Chunk<kVectors> chunk(layout_, lane);
+    Vec window[kVectors];
+    load_sums<kVectors>(s_.window_sums.data() + lane, window);
+    Column entering = column(x + radius_ - layout_.first_column, lane);
+    const std::uint16_t* gone = column_before(x, lane);
     const std::ptrdiff_t stride = lanes_;
-    const int last_entering = columns_ - 1 - radius_ + layout_.first_column;
-    const int first_leaving = layout_.first_column + radius_;
     const WindowLimits* limits = s_.limits.data() + (x - layout_.first_column);
     std::uint16_t* kept = s_.batch_sums.data() + lane;
     for (int j = 0; j < size; ++j, entering.advance(), gone += stride, kept += stride) {
-      if (x + j <= last_entering) enter<kVectors, Partners::kSome>(entering, chunk, window);
-      if (x + j >= first_leaving) leave<kVectors>(gone, window);
+      if (x + j < end_entering_) enter<kVectors, Partners::kSomePadded>(entering, chunk, window);
+      leave<kVectors>(gone, window);
       store_in_order<kVectors>(window, kept);
       Vec whole[kVectors];
       for (int k = 0; k < kVectors; ++k) {
@@ -429,19 +646,21 @@ class SadLanes {
       }
       best.offer<kFirst>(j, comparable<kVectors>(Keys(), best_keys<kVectors>(chunk, whole)));
     }
-    for (int k = 0; k < kVectors; ++k) hn::Store(window[k], lanes, s_.window_sums.data() + lane + k * kVector);
+    store_sums<kVectors>(window, s_.window_sums.data() + lane);
   }
 
-  void match_inner(int x, int size) noexcept {
+  /// Of all lanes; kPadded is what the first chunk's are where there is padding.
+  template <Partners kPartners, Partners kPadded>
+  void slide_all(int x, int size) noexcept {
     BatchBest& best = best_;
-    const bool padded = layout_.count != lanes_;
+    const bool padded = padding_ != 0;
     for_each_chunk(lanes_, [&](auto vectors, int lane, bool first) {
       if (!first) {
-        slide<vectors(), Partners::kAll, false>(lane, x, size, best);
+        slide<vectors(), kPartners, false>(lane, x, size, best);
       } else if (padded) {
-        slide<vectors(), Partners::kPadded, true>(lane, x, size, best);
+        slide<vectors(), kPadded, true>(lane, x, size, best);
       } else {
-        slide<vectors(), Partners::kAll, true>(lane, x, size, best);
+        slide<vectors(), kPartners, true>(lane, x, size, best);
       }
     });
   }
@@ -456,16 +675,15 @@ class SadLanes {
       }
     });
     best.find(size);
-    for (int j = 0; j < size;) {
-      if (j + 4 <= size && x + j >= ranked_begin_ && x + j + 4 <= ranked_end_) {
-        choose_four(x + j, j);
-        j += 4;
-      } else {
-        best.keys[j] = choose(x + j, j);
-        nones_ += best.keys[j] == kNoId ? 1 : 0;
-        ++j;
-      }
+    for (int j = 0; j < size; ++j) {
+      best.keys[j] = choose(x + j, j);
+      nones_ += best.keys[j] == kNoId ? 1 : 0;
     }
+  }
+
+  void match_ranked(int x, int size) noexcept {
+    slide_all<Partners::kSome, Partners::kSomePadded>(x, size);
+    for (int j = 0; j < size; j += 4) choose_four(x + j, j);
   }
 
   /// The best candidates of pixels x..x+3, the j-th and following of their batch, of those with whole windows and those
@@ -517,19 +735,33 @@ class SadLanes {
   void match_row(int y) noexcept {
     const Span span = task_.wanted.span(y);
     if (span.empty()) {
-      for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { change_columns<vectors()>(lane, 0, columns_); });
+      enter_columns<false>(0, columns_);
       return;
     }
-    for_each_chunk(lanes_, [&](auto vectors, int lane, bool) { start_row<vectors()>(lane, span); });
-    for (int x = span.first; x <= span.last;) {
-      // What is left of the fours goes the way of the clipped.
-      int size = layout_.batch(x, span.last);
-      nones_ = 0;
-      const bool inner = layout_.is_inner(x) && size >= 4;
-      if (inner) {
-        size = size / 4 * 4;
-        match_inner(x, size);
+    for_each_chunk(lanes_, [&](auto vectors, int lane, bool) {
+      if (all_exist_) {
+        start_row<vectors(), Partners::kAll>(lane, span);
       } else {
+        start_row<vectors(), Partners::kSomePadded>(lane, span);
+      }
+    });
+    const int end_ranked = std::min(ranked_end_, span.last + 1);
+    for (int x = span.first; x <= span.last;) {
+      // What is left of the fours goes the general way.
+      int size = layout_.batch(x, span.last, kSadPixelStep);
+      nones_ = 0;
+      if (layout_.is_inner(x) && size >= 4) {
+        size = size / 4 * 4;
+        slide_all<Partners::kAll, Partners::kPadded>(x, size);
+      } else if (x >= end_entering_ && end_is_whole_ && size >= 4) {
+        size = size / 4 * 4;
+        slide_all<Partners::kNone, Partners::kNone>(x, size);
+      } else if (x >= ranked_begin_ && end_ranked - x >= 4) {
+        // The last four may have inner pixels, too.
+        size = std::min((size + 3) / 4 * 4, (end_ranked - x) / 4 * 4);
+        match_ranked(x, size);
+      } else {
+        if (x < ranked_begin_) size = std::min(size, ranked_begin_ - x);
         match_clipped(x, size);
       }
       if (task_.mask.empty()) {
@@ -545,27 +777,24 @@ class SadLanes {
   void write(int x, int y, int size) noexcept {
     const std::uint8_t* mask = task_.mask.row(y) + x;
     std::uint16_t* out = task_.out.row(y) + x;
-    const FourKeys four;
-    const hn::Rebind<std::int32_t, FourKeys> as_signed;
-    const hn::Rebind<std::uint16_t, FourKeys> narrow;
-    const hn::Rebind<std::uint8_t, FourKeys> bytes;
-    const auto no_id = hn::Set(four, kNoId);
-    const auto smallest = hn::Set(four, static_cast<std::uint32_t>(smallest_));
     std::size_t wanted = 0;
     std::size_t border = 0;
+    const auto write_some = [&](auto d, int j) HWY_ATTR {
+      const hn::Rebind<std::uint8_t, decltype(d)> bytes;
+      const auto found = best_.ids(d, j);
+      const auto none = hn::Eq(found, hn::Set(d, BatchBest::kLargestId));
+      const auto some = BatchBest::disparity(d, found, smallest_);
+      const auto asked = hn::Ne(hn::PromoteTo(d, hn::LoadU(bytes, mask + j)), hn::Zero(d));
+      const auto values = hn::IfThenElse(none, hn::Set(d, kNoDisparity), some);
+      hn::StoreU(hn::IfThenElse(asked, values, hn::LoadU(d, out + j)), d, out + j);
+      wanted += hn::CountTrue(d, asked);
+      if (nones_ != 0) border += hn::CountTrue(d, hn::And(asked, none));
+    };
     int j = 0;
-    for (; j + 4 <= size; j += 4) {
-      const auto asked = hn::LoadU(bytes, mask + j);
-      const auto id = hn::And(hn::Load(four, best_.keys + j), no_id);
-      const auto none = hn::Eq(id, no_id);
-      const auto values = hn::IfThenElse(none, hn::Set(four, kNoDisparity), hn::ShiftLeft<4>(hn::Add(id, smallest)));
-      const auto is_asked = hn::Ne(hn::PromoteTo(narrow, asked), hn::Zero(narrow));
-      hn::StoreU(
-          hn::IfThenElse(is_asked, hn::DemoteTo(narrow, hn::BitCast(as_signed, values)), hn::LoadU(narrow, out + j)),
-          narrow, out + j);
-      const auto counted = hn::Ne(hn::PromoteTo(four, asked), hn::Zero(four));
-      wanted += hn::CountTrue(four, counted);
-      border += hn::CountTrue(four, hn::And(counted, none));
+    for (; j + 8 <= size; j += 8) write_some(BatchBest::Eight(), j);
+    if (j + 4 <= size) {
+      write_some(BatchBest::Four(), j);
+      j += 4;
     }
     for (; j < size; ++j) {
       if (mask[j] == 0) continue;
@@ -601,8 +830,11 @@ class SadLanes {
   int padding_;   ///< of lanes_
   int smallest_;  ///< disparity of id 0, maybe of padding [px]
   int columns_;
-  int slot_ = -1;         ///< of distances, of the row that enters
-  int ranked_begin_ = 0;  ///< pixels [begin, end) have RankedKeys
+  int end_entering_;          ///< from this pixel on no column enters the window
+  bool all_exist_;            ///< each lane of each column has a partner
+  bool end_is_whole_ = true;  ///< at the left picture's right end all windows of a pixel have as many columns
+  int slot_ = -1;             ///< of distances, of the row that enters
+  int ranked_begin_ = 0;      ///< pixels [begin, end) have RankedKeys
   int ranked_end_ = -1;
   int nones_ = 0;   ///< pixels of the batch without a candidate
   BatchBest best_;  ///< the batch's winners, ids as of Chunk; kNoId where there is no candidate
@@ -610,7 +842,7 @@ class SadLanes {
 };
 
 DisparityCounts match_in_lanes(const SadTask& task, SadScratch& scratch) {
-#if HWY_ARCH_X86
+#if HWY_ARCH_X86 || HWY_ARCH_ARM_A64
   if (2 * task.geometry.radius + 1 <= kLargestPairedBlock) return SadLanes<true>(task, scratch).run();
 #endif
   return SadLanes<false>(task, scratch).run();
@@ -633,17 +865,19 @@ SadScratch SadScratch::create(int width, int block, int disparities, Arena& aren
   const auto lanes = static_cast<std::size_t>(padded_lanes(disparities));
   SadScratch s;
   s.distances = arena.array<std::uint8_t>(static_cast<std::size_t>(block) * columns * lanes);
-  s.column_sums = arena.array<std::uint16_t>((columns + 1) * lanes);
+  s.column_sums = arena.array<std::uint16_t>((columns + static_cast<std::size_t>(block / 2) + 1) * lanes);
   s.window_sums = arena.array<std::uint16_t>(lanes);
-  s.batch_sums = arena.array<std::uint16_t>(lanes * kPixelStep + kLaneStep);  // read in vectors
+  s.batch_sums = arena.array<std::uint16_t>(lanes * kSadPixelStep + kLaneStep);  // read in vectors
   s.reference_sums = arena.array<std::uint32_t>(lanes);
   s.limits = arena.array<WindowLimits>(columns);
   s.ranked = arena.array<RankedKeys>(columns);
   s.whole_weights = arena.array<std::uint32_t>(columns);
   s.rank_zero = arena.array<std::uint32_t>(columns);
   s.left_greys = arena.array<std::uint32_t>(columns);
+  s.left_bytes = arena.array<std::uint8_t>(columns);
   s.right_greys = arena.array<std::uint8_t>(columns + lanes);
   s.partner_exists = arena.array<std::uint8_t>(columns + lanes);
+  s.partner_clips = arena.array<std::uint8_t>(columns + lanes);
   return s;
 }
 

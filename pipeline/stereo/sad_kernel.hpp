@@ -34,6 +34,9 @@ struct SadCandidate {
 /// A window of 15x15 pixels sums up to 57,375: what lanes of 16 bits hold.
 inline constexpr int kLargestSadLaneBlock = 15;
 
+/// Pixels between two chunks of lanes.
+inline constexpr int kSadPixelStep = 128;
+
 /// How windows clipped at the left end of the right picture compare with the whole ones of the same left column, for
 /// blocks up to kLargestBlock: sum x weight + rank is the smaller, the smaller the mean; of equal means, the smaller
 /// the disparity. Exact: weights are kMultiple / columns x kRanks, and 11 x 255 x kMultiple x kRanks < 2^32.
@@ -41,6 +44,8 @@ struct RankedKeys {
   static constexpr int kRanks = 8;
   static constexpr int kLargestBlock = 11;
   static constexpr int kMultiple = 27720;  ///< of 1..11
+  /// Of whole windows where there is none: their sum is that of no other window.
+  static constexpr std::uint32_t kNoWeight = 0xFFFF;
 
   [[nodiscard]] static constexpr std::uint32_t weight(int columns) noexcept {
     return static_cast<std::uint32_t>(kMultiple / columns * kRanks);
@@ -56,17 +61,19 @@ struct SadScratch {
   [[nodiscard]] static SadScratch create(int width, int block, int disparities, Arena& arena) noexcept;
 
   std::span<std::uint8_t> distances;        ///< [row of the window][column of the region][lane]
-  std::span<std::uint16_t> column_sums;     ///< [column of the region][lane], over the rows of the window
+  std::span<std::uint16_t> column_sums;     ///< [column of the region][lane], over the rows of the window; zeros before
   std::span<std::uint16_t> window_sums;     ///< [lane]
-  std::span<std::uint16_t> batch_sums;      ///< [pixel of kPixelStep][lane], beside the borders
+  std::span<std::uint16_t> batch_sums;      ///< [pixel of kSadPixelStep][lane], beside the borders
   std::span<std::uint32_t> reference_sums;  ///< [disparity], window sums of the plain way
   std::span<WindowLimits> limits;           ///< [column of the region]
   std::span<RankedKeys> ranked;             ///< [column of the region]
   std::span<std::uint32_t> whole_weights;   ///< [column of the region] of RankedKeys
   std::span<std::uint32_t> rank_zero;       ///< [column of the region] the id that rank 0 would have
   std::span<std::uint32_t> left_greys;      ///< [column of the region] four times, of the row that enters the window
+  std::span<std::uint8_t> left_bytes;      ///< the same once; a kernel uses one of the two
   std::span<std::uint8_t> right_greys;     ///< [column of the region + lane] likewise once, 0 where there is no partner
   std::span<std::uint8_t> partner_exists;  ///< [column of the region + lane] 0 or 0xFF
+  std::span<std::uint8_t> partner_clips;   ///< likewise: whether the right picture's left end clips its window
 };
 
 /// The plain reference, any block: the equations of SadMatcher, column sums and window sums kept up to date.
