@@ -59,9 +59,8 @@ struct Settled {
 /// * back by more than kStepPeriods: seen; what waits is handed back and both sides start anew (seen twice if a frame
 ///   from before it comes later from the other side);
 /// * back by less: frames are out of order until the stamps have caught up;
-/// * back by whole periods at the moment at which the other side loses frames: a right from before can carry the time
-/// of
-///   a left from after. Times cannot tell; sequences can. With `sequenced`, left and right must keep the difference of
+/// * back by whole periods just when the other side loses frames: a right from before can carry the time of a left from
+///   after. Times cannot tell; sequences can. With `sequenced`, left and right must keep the difference of
 ///   their sequences, too. What fits by time and not by sequence is handed back with all that waits, until kRelearn
 ///   such fits in a row agree on a new difference (a sensor was restarted, or it does not count what it loses). That is
 ///   one more than a step of kStepPeriods can feign. The first difference is learnt in the same way from kLearn fits,

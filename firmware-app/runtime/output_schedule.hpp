@@ -29,17 +29,16 @@ namespace stereotrack::runtime {
 /// at most once, in the order of their times, and never later than due + grace.
 ///
 /// What happens when (each a test of that name in tests/unit/runtime):
-///     late result            its slot left as kPredicted; the result then only updates the state
-///     superseded result      the frame loop passed over this pair: kPredicted from the newer state
-///     late notice            its slot left as kMissing, or t + L has passed: it leaves no more; the cadence takes its
-///     phase notice out of order    refused; its slot leaves as kMissing capture clock steps    stamps from the future,
-///     or older than a period over L, are not believed: the cadence goes on
-///                            in monotonic time, as kMissing, and map_is_suspect() asks for a new ClockMap. A smaller
-///                            step moves the outputs by as much until the owner measures anew, which it does every
-///                            second.
-///     process suspended      slots overslept by more than grace are dropped and counted, none is sent in a burst
-///     L under the pipeline   all slots are kPredicted from the state of the pair or two before
-///     L of several periods   several slots in flight, each with its own result
+/// * late result: its slot left as kPredicted; the result then only updates the state.
+/// * superseded result, the frame loop passed over this pair: kPredicted from the newer state.
+/// * late notice, its slot left as kMissing, or t + L has passed: it leaves no more; the cadence takes its phase.
+/// * notice out of order: refused; its slot leaves as kMissing.
+/// * capture clock steps: stamps from the future, or older than a period over L, are not believed. The cadence goes on
+///   in monotonic time, as kMissing, and map_is_suspect() asks for a new ClockMap. A smaller step moves the outputs by
+///   as much until the owner measures anew, which it does every second.
+/// * process suspended: slots overslept by more than grace are dropped and counted, none is sent in a burst.
+/// * L under the pipeline: all slots are kPredicted from the state of the pair or two before.
+/// * L of several periods: several slots in flight, each with its own result.
 ///
 /// Payloads (targets, covariances) stay with the caller, in an array of kKeeps: result() says where a payload belongs,
 /// an output says which to take. One thread. No memory but its own. O(kMaxInFlight) a call.
