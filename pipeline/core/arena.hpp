@@ -71,7 +71,8 @@ class Arena {
   };
 
   void* take(std::size_t bytes) noexcept {
-    if (sealed_) {
+    constexpr std::size_t kMost = PTRDIFF_MAX;  // no object is larger
+    if (sealed_ || bytes > kMost - kAlignment) {
       failed_ = true;
       return nullptr;
     }

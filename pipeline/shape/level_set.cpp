@@ -206,7 +206,7 @@ int LevelSet::sweep() noexcept {
   int changed = 0;
   for (std::int32_t i = 0; i < band_size; ++i) {
     const std::int32_t p = band[i];
-    const int side = sides[p];
+    const int side = sides[p] > 0 ? 1 : -1;  // what is in the band is on one of the two
     const int other = -side;
     if (sides[p - 1] != other && sides[p + 1] != other && sides[p - stride] != other && sides[p + stride] != other) {
       continue;

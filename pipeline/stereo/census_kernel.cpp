@@ -644,7 +644,7 @@ class CensusLanes {
 
   HWY_INLINE void find_best(Groups groups, int size, Pixels& pixels) const {
     const Lanes lanes;
-    for (int j = 0; j < kBatch; ++j) pixels.costs[j] = kNoKeyCost;
+    std::fill_n(pixels.costs, kBatch, kNoKeyCost);
     for (int group = groups.end - 1; group >= groups.begin; --group) {
       find_smallest<1>(group, 1, size, pixels.keys);
       for (int j = 0; j < kBatch; j += kVector) {

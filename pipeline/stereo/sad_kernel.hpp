@@ -70,7 +70,7 @@ struct SadScratch {
   std::span<std::uint32_t> whole_weights;   ///< [column of the region] of RankedKeys
   std::span<std::uint32_t> rank_zero;       ///< [column of the region] the id that rank 0 would have
   std::span<std::uint32_t> left_greys;      ///< [column of the region] four times, of the row that enters the window
-  std::span<std::uint8_t> left_bytes;      ///< the same once; a kernel uses one of the two
+  std::span<std::uint8_t> left_bytes;       ///< the same once; a kernel uses one of the two
   std::span<std::uint8_t> right_greys;     ///< [column of the region + lane] likewise once, 0 where there is no partner
   std::span<std::uint8_t> partner_exists;  ///< [column of the region + lane] 0 or 0xFF
   std::span<std::uint8_t> partner_clips;   ///< likewise: whether the right picture's left end clips its window

@@ -218,6 +218,7 @@ void tensors_of(ImageView<const std::uint8_t> luma, int x, int y, int count, Ten
   }
   for (int k = 0; k < count; ++k) {
     const auto five = [k](const std::int32_t* sums) {
+      // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): k + 4 < length, which is count + 4
       return sums[k] + sums[k + 1] + sums[k + 2] + sums[k + 3] + sums[k + 4];
     };
     out[k] = {five(columns[0]), five(columns[1]), five(columns[2])};

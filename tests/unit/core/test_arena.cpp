@@ -77,6 +77,14 @@ TEST(Arena, MoreThanThereIsFailsAndStaysFailed) {
   EXPECT_TRUE(arena.failed());
 }
 
+// With the header that each request has, this many bytes are none.
+TEST(Arena, RequestThatOverflowsWithItsHeaderFails) {
+  Arena arena;
+  EXPECT_TRUE(arena.array<std::uint8_t>(std::numeric_limits<std::size_t>::max() - Arena::kAlignment + 1).empty());
+  EXPECT_TRUE(arena.failed());
+  EXPECT_EQ(arena.bytes_used(), 0U);
+}
+
 TEST(Arena, ImageWithoutRowsIsEmpty) {
   Arena arena;
   EXPECT_TRUE(arena.image<std::uint8_t>(5, 0).empty());
