@@ -84,10 +84,10 @@ struct SadScratch {
 ///   - absolute differences are made of bytes, and kept until their row leaves the window,
 ///   - a column's sums are brought to the new row in the pass that adds them to the window and takes the minimum,
 ///   - the larger half of a chunk of disparities is compared with the smaller one in a single minimum: an even sum is
-///     of the one, an odd one of the other (x86, blocks up to 11; 16 bits hold no more),
+///     of the one, an odd one of the other (x86 and 64-bit ARM, blocks up to 11; 16 bits hold no more),
 ///   - four pixels share the search for the smallest lane.
-/// Beside the borders about 3. Windows that the right picture's ends clip are compared as exact fractions; four
-/// pixels at a time where it is the left end that clips (RankedKeys).
+/// NEON 1.3. Where the right picture's left end clips windows about twice as many: those are compared as exact
+/// fractions, four pixels at a time (RankedKeys). Other clipped windows pixel by pixel.
 [[nodiscard]] DisparityCounts sad_lanes(const SadTask& task, SadScratch& scratch) noexcept;
 
 }  // namespace stereotrack
