@@ -59,7 +59,12 @@ Thread::Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> 
   const int made = pthread_create(&thread_, &attributes, &Thread::run, this);
   (void)pthread_attr_destroy(&attributes);
   if (made != 0) throw std::runtime_error("thread " + plan.name + ": " + reason(made));
-  // From here, not from inside: who starts it must know what is missing before it goes on.
+  set_up();
+  may_begin_.release();
+}
+
+// From outside, while the thread waits: who starts it must know what is missing before it goes on.
+void Thread::set_up() {
   (void)pthread_setname_np(thread_, plan_.name.c_str());
   if (mode_ == RealTimeMode::kOff) return;
   if (plan_.core >= 0) {
@@ -97,6 +102,7 @@ void* Thread::run(void* self) noexcept {
     touch_stack();
     (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
   }
+  thread.may_begin_.acquire();
   thread.body_();
   return nullptr;
 }

@@ -3,6 +3,7 @@
 #include <pthread.h>
 
 #include <functional>
+#include <semaphore>
 #include <string>
 #include <vector>
 
@@ -55,7 +56,8 @@ class RealTimeProcess {
 
 /// A thread with policy, priority and core from its plan, a stack of known size that is present from the start, and a
 /// timer slack of 1 ns (the ordinary scheduler's timers may otherwise come 50 us late so that several wake together).
-/// Starting never fails for want of a right: what was not granted is in missing(), and the thread runs without it.
+/// Its body begins once all that is set. Starting never fails for want of a right: what was not granted is in
+/// missing(), and the thread runs without it.
 class Thread {
  public:
   static constexpr std::size_t kStackBytes =
@@ -72,12 +74,14 @@ class Thread {
   [[nodiscard]] const std::vector<Missing>& missing() const noexcept { return missing_; }
 
  private:
+  void set_up();
   static void* run(void* self) noexcept;
 
   ThreadPlan plan_;
   RealTimeMode mode_;
   std::function<void()> body_;
   std::vector<Missing> missing_;
+  std::binary_semaphore may_begin_{0};
   pthread_t thread_{};
   bool joined_ = false;
 };

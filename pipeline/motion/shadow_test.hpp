@@ -66,7 +66,7 @@ class ShadowTest {
     ImageView<const std::uint16_t> disparity_background;  ///< the same of the background
   };
 
-  /// max_label: largest label of a region that run() is given, 1..65535. Faults: kBadConfig, kBadSize, kOutOfMemory.
+  /// max_label: the largest label that pixels of a mask can have, 1..65535. Faults: kBadConfig, kBadSize, kOutOfMemory.
   [[nodiscard]] static Result<ShadowTest> create(const Config& config, int width, int height, int max_label,
                                                  Arena& arena) noexcept;
 

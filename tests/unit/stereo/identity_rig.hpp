@@ -18,8 +18,8 @@ class IdentityRig {
     calibration.left.width = calibration.right.width = width;
     calibration.left.height = calibration.right.height = height;
     calibration.left.fx = calibration.left.fy = calibration.right.fx = calibration.right.fy = width;
-    calibration.left.cx = calibration.right.cx = width / 2;
-    calibration.left.cy = calibration.right.cy = height / 2;
+    calibration.left.cx = calibration.right.cx = 0.5 * width;
+    calibration.left.cy = calibration.right.cy = 0.5 * height;
     calibration.R_right_left = Eigen::Matrix3d::Identity();
     calibration.t_right_left = Eigen::Vector3d(-1, 0, 0);
     rectifier_.emplace(*Rectifier::create(calibration, width, height, arena));
