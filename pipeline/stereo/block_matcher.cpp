@@ -2,31 +2,35 @@
 
 namespace stereotrack {
 
+namespace {
+
+// What both matchers are told alike.
+template <class Matcher>
+typename Matcher::Config config_of(const BlockMatcher::Config& config, const RectifiedGeometry& canvas) noexcept {
+  typename Matcher::Config made;
+  made.width = canvas.width_left;
+  made.height = canvas.height;
+  made.right_width = canvas.width_right;
+  made.offset = canvas.offset;
+  made.block = config.block;
+  made.range = {0, config.max};
+  made.region_disparities = config.region_disparities;
+  return made;
+}
+
+}  // namespace
+
 Result<BlockMatcher> BlockMatcher::create(const Config& config, const RectifiedGeometry& canvas,
                                           Arena& arena) noexcept {
   BlockMatcher self(config, canvas.offset);
-  const DisparityRange dense{0, config.max};
   if (config.method == MatchMethod::kSad) {
-    const auto made = SadMatcher::create({.width = canvas.width_left,
-                                          .height = canvas.height,
-                                          .right_width = canvas.width_right,
-                                          .offset = canvas.offset,
-                                          .block = config.block,
-                                          .range = dense,
-                                          .region_disparities = config.region_disparities},
-                                         arena);
+    const auto made = SadMatcher::create(config_of<SadMatcher>(config, canvas), arena);
     if (!made.has_value()) return fail(made.error());
     self.sad_ = *made;
   } else {
-    const auto made = CensusMatcher::create({.width = canvas.width_left,
-                                             .height = canvas.height,
-                                             .right_width = canvas.width_right,
-                                             .offset = canvas.offset,
-                                             .block = config.block,
-                                             .range = dense,
-                                             .region_disparities = config.region_disparities,
-                                             .filter = {.fill_px = 0}},
-                                            arena);
+    auto census = config_of<CensusMatcher>(config, canvas);
+    census.filter.fill_px = 0;
+    const auto made = CensusMatcher::create(census, arena);
     if (!made.has_value()) return fail(made.error());
     self.census_ = *made;
   }
