@@ -230,7 +230,7 @@ Result<void> Pipeline::create_stereo(Arena& arena) noexcept {
   return outcome;
 }
 
-Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
+Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) noexcept {
   const bool stereo = rectifier_.has_value();
   const auto fits = [&](const Picture& picture) {
     return picture.width == setup_.width && picture.height == setup_.height &&
@@ -241,15 +241,20 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   dt_ = started_ ? std::max(seconds_between(last_time_, pair.capture_time), 0.0) : 0.0;
   last_time_ = pair.capture_time;
   started_ = true;
+  left_out_ = leave_out;
   rejections_ = {};
+  // Without it no corner is followed, and none taken up.
+  const auto corners_in = [&]() -> ImageView<const std::uint8_t> {
+    return leaves_out(left_out_, Effort::kCorners) ? ImageView<const std::uint8_t>() : left_.y;
+  };
 
   ingest(pair);  // gray 3.1, equalisation 3.2-3.5, chroma 3.17-3.19
   ended(Stage::kIngest);
-  predictions_ = tracker_->predict(dt_, left_.y);  // 3.24, 3.26, 3.27: bounds the searches below
-  find_foreground();                               // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
-  ended(Stage::kForeground);                       // contours, opening 3.13-3.15, blobs
-  refine_blobs();                                  // convex hull 3.16, level set
-  if (stereo) find_disparity();                    // block matching 3.6, where something moves
+  predictions_ = tracker_->predict(dt_, corners_in());  // 3.24, 3.26, 3.27: bounds the searches below
+  find_foreground();             // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
+  ended(Stage::kForeground);     // contours, opening 3.13-3.15, blobs
+  refine_blobs();                // convex hull 3.16, level set
+  if (stereo) find_disparity();  // block matching 3.6, where something moves
   ended(Stage::kDisparity);
   remove_shadows();  // sigma test 3.20-3.23, or stereo first
   ended(Stage::kShadow);
@@ -265,7 +270,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   for (Detector::Candidate& candidate : detector_->segment(objects)) match_whole(candidate, objects);
   const std::span<const Detection> detections = detector_->conclude(objects);
   ended(Stage::kObjects);
-  tracker_->update(detections, left_.y, blobs_.labels);  // 3.25, 3.28-3.32
+  tracker_->update(detections, corners_in(), blobs_.labels);  // 3.25, 3.28-3.32
   ended(Stage::kTracking);
   learn_background();
   ended(Stage::kBackground);
@@ -276,6 +281,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
   result.capture_time = pair.capture_time;
   result.flags = (stereo ? 0U : kFlagMono) | (setup_.colour ? 0U : kFlagNoColour) |
                  (frames_ <= config_.background.frames ? kFlagLearning : 0U) | (light_change_ ? kFlagLightChange : 0U);
+  result.left_out = left_out_;
   result.tracks = tracker_->reports();
   result.mask = left_.mask;
   result.labels = blobs_.labels;
@@ -359,13 +365,14 @@ void Pipeline::foreground_from_model() noexcept {
   right_moving_.show(right_.mask);
   background_canvases_.left.show(background_left_->luma());
   background_canvases_.right.show(background_right_->luma());
-  if (frames_ > 1 && config_.shadow.method == ShadowMethod::kStereo) {
+  if (frames_ > 1 && config_.shadow.method == ShadowMethod::kStereo &&
+      !leaves_out(left_out_, Effort::kBackgroundDisparity)) {
     background_disparity_->renew(background_canvases_, *matcher_, {0, full_range_});
   }
 }
 
 void Pipeline::refine_blobs() noexcept {
-  if (!level_set_) return;
+  if (!level_set_ || leaves_out(left_out_, Effort::kLevelSet)) return;
   for (Blob& blob : blobs_.blobs) {
     const Result<Hull> hull = convex_hull_->run(blobs_.labels, blob.box, blob.label);
     if (!hull.has_value()) continue;
@@ -407,7 +414,7 @@ RegionMatch Pipeline::match_region(CanvasPair& pair, LazyCanvas& right_moving, c
 void Pipeline::match_blob(const Blob& blob) noexcept {
   const Rect roi = rectifier_->on_left_canvas(blob.box);
   if (roi.empty()) return;
-  if (config_.disparity.mode == DisparityMode::kRegions) {
+  if (disparity_mode() == DisparityMode::kRegions) {
     const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
     for (int y = roi.top; y < roi.bottom(); ++y) {
       const Rectifier::Point16* from = raw.row(y);
@@ -430,8 +437,12 @@ void Pipeline::match_blob(const Blob& blob) noexcept {
   });
 }
 
+DisparityMode Pipeline::disparity_mode() const noexcept {
+  return leaves_out(left_out_, Effort::kDenseMap) ? DisparityMode::kRegions : config_.disparity.mode;
+}
+
 void Pipeline::find_disparity() noexcept {
-  if (config_.disparity.mode == DisparityMode::kDense) (void)matcher_->run(canvases_, canvas_disparity_);
+  if (disparity_mode() == DisparityMode::kDense) (void)matcher_->run(canvases_, canvas_disparity_);
   for (const Blob& blob : blobs_.blobs) {
     if (blob.area > 0) match_blob(blob);
   }

@@ -9,6 +9,7 @@
 #include "pipeline/core/image_view.hpp"
 #include "pipeline/core/result.hpp"
 #include "pipeline/core/stage.hpp"
+#include "pipeline/effort.hpp"
 #include "pipeline/frame.hpp"
 #include "pipeline/geometry/lazy_canvas.hpp"
 #include "pipeline/geometry/rectify.hpp"
@@ -54,6 +55,7 @@ struct FrameResult {
   std::uint64_t ordinal = 0;
   CaptureTime capture_time{};
   std::uint32_t flags = 0;                ///< FrameFlag bits
+  EffortBits left_out = 0;                ///< efforts that this frame did without
   std::span<const TrackReport> tracks;    ///< in the order of their ids
   ImageView<const std::uint8_t> mask;     ///< final object mask, raw left picture, 0 or 255
   ImageView<const std::uint16_t> labels;  ///< detection of each pixel, 0 = none
@@ -62,7 +64,8 @@ struct FrameResult {
   std::uint64_t hulls_reduced = 0;  ///< hulls with more vertices than there is room for, since create(): see ConvexHull
 };
 
-/// The whole algorithm: pairs in, targets out. A function of its state, the pixels and the capture times.
+/// The whole algorithm: pairs in, targets out. A function of its state, the pixels, the capture times and the efforts
+/// that it is told to leave out.
 /// The order of the stages is that of the document; run() reads like its table of contents.
 /// One thread. No allocation, no lock, no I/O after create().
 class Pipeline {
@@ -78,8 +81,8 @@ class Pipeline {
   /// Faults: those of the stages. The arena must outlive the pipeline.
   [[nodiscard]] static Result<Pipeline> create(const PipelineConfig& config, const Setup& setup, Arena& arena) noexcept;
 
-  /// Faults, state untouched: kBadSize, kBadFormat.
-  [[nodiscard]] Result<FrameResult> run(const FramePair& pair) noexcept;
+  /// Pixels are read until Stage::kIngest has ended, and not after. Faults, state untouched: kBadSize, kBadFormat.
+  [[nodiscard]] Result<FrameResult> run(const FramePair& pair, EffortBits leave_out = 0) noexcept;
 
   /// Null for mono.
   [[nodiscard]] const Rectifier* rectifier() const noexcept { return rectifier_ ? &*rectifier_ : nullptr; }
@@ -114,6 +117,7 @@ class Pipeline {
   void find_blobs(ImageView<const std::uint8_t> mask) noexcept;
   void foreground_from_edges() noexcept;
   void foreground_from_model() noexcept;
+  [[nodiscard]] DisparityMode disparity_mode() const noexcept;
   void find_disparity() noexcept;
   void match_blob(const Blob& blob) noexcept;
   [[nodiscard]] bool is_explained(const Blob& blob) const noexcept;
@@ -135,7 +139,8 @@ class Pipeline {
   MemoryUse memory_;
   bool started_ = false;
   bool light_change_ = false;
-  int frames_ = 0;  ///< seen, counted to one more than background.frames
+  EffortBits left_out_ = 0;  ///< in this frame
+  int frames_ = 0;           ///< seen, counted to one more than background.frames
   int full_range_ = 0;
   CaptureTime last_time_{};
   double dt_ = 0;  ///< since the frame before [s]

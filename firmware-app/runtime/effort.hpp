@@ -7,28 +7,9 @@
 
 #include "pipeline/core/bounded_vector.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/effort.hpp"
 
 namespace stereotrack::runtime {
-
-/// What the pipeline can leave out of a frame and still track.
-enum class Effort : std::uint8_t {
-  kLevelSet,             ///< blobs keep their hulls (thesis preset)
-  kCorners,              ///< targets move by their boxes and depths alone, not by corner features
-  kBackgroundDisparity,  ///< the background's disparity keeps its age: no strip of rows is matched this frame
-  kDenseMap,             ///< disparity where something moves, instead of everywhere
-};
-inline constexpr std::size_t kEfforts = 4;
-
-[[nodiscard]] constexpr const char* to_string(Effort effort) noexcept {
-  constexpr std::array<const char*, kEfforts> kNames{"level_set", "corners", "background_disparity", "dense_map"};
-  return kNames[static_cast<std::size_t>(effort)];
-}
-
-/// A set of efforts, one bit each: what telemetry says was left out, and what a recording keeps as a decision.
-using EffortBits = std::uint8_t;
-[[nodiscard]] constexpr EffortBits bit_of(Effort effort) noexcept {
-  return static_cast<EffortBits>(1U << static_cast<unsigned>(effort));
-}
 
 /// Decides, after each frame, what the next one leaves out.
 ///
@@ -44,11 +25,10 @@ using EffortBits = std::uint8_t;
 /// up to patience_most; a trial that is survived sets it back to restore_after. An effort for which there is no room
 /// thus costs one overrun in patience_most frames in the long run, where a plain hysteresis pays one in restore_after.
 ///
-/// How it will be wired: the frame loop measures Pipeline::run by its clock, calls next() with the time that was left
-/// of the period when it began as budget, and gives the bits to the next Pipeline::run, whose stages look at them where
-/// they look at their Config today (level set, corners, background disparity, mode of the disparity); the bits that
-/// were in force go into the frame's flags and telemetry, and into a recording, whose replay passes them in instead of
-/// deciding. Pure logic: the same times give the same decisions. One thread, O(1), no memory but its own.
+/// The frame loop measures Pipeline::run by its clock, calls next() with the time that was left when it began as
+/// budget, and gives the bits to the next Pipeline::run; the bits that were in force go into the frame's flags and
+/// telemetry, and into a recording, whose replay passes them in instead of deciding. Pure logic: the same times give
+/// the same decisions. One thread, O(1), no memory but its own.
 class EffortController {
  public:
   struct Config {

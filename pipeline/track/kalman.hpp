@@ -45,6 +45,12 @@ class ConstantVelocityFilter {
     P_.template bottomRightCorner<D, D>() = Matrix::Identity() * (velocity_sd * velocity_sd);
   }
 
+  /// Goes on from a state and covariance that another filter had.
+  void resume(const State& x, const Covariance& P) noexcept {
+    x_ = x;
+    P_ = P;
+  }
+
   /// (3.26), (3.27) over dt seconds, dt >= 0, with accelerations of standard deviation acceleration_sd.
   void predict(double dt, double acceleration_sd) noexcept {
     Covariance F = Covariance::Identity();

@@ -130,7 +130,11 @@ std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uin
     target.image.predict(dt, config_.acceleration * view_.focal);
     const double distance = std::max(target.space.position().z(), 0.0);
     if (target.has_depth) target.space.predict(dt, config_.acceleration * distance);
-    if (!luma.empty()) features_.follow(luma, dt, config_.acceleration * view_.focal, target.features);
+    if (luma.empty()) {
+      target.features.clear();  // a frame later they are not where their filters say
+    } else {
+      features_.follow(luma, dt, config_.acceleration * view_.focal, target.features);
+    }
     Prediction prediction;
     prediction.id = target.id;
     prediction.confirmed = target.state != TrackState::kTentative;

@@ -85,8 +85,8 @@ class Tracker {
   [[nodiscard]] static Result<Tracker> create(const Config& config, const Features::Config& features, const View& view,
                                               Arena& arena) noexcept;
 
-  /// Moves all targets on by dt seconds (>= 0), searches their features in `luma` (raw left picture; empty: not)
-  /// and says where they are expected.
+  /// Moves all targets on by dt seconds (>= 0), searches their features in `luma` (raw left picture; empty: drops
+  /// them) and says where they are expected.
   [[nodiscard]] std::span<const Prediction> predict(double dt, ImageView<const std::uint8_t> luma = {}) noexcept;
 
   /// Takes the detections of this frame in. More than kMaxDetections: the rest is not looked at. New features
