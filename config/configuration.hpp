@@ -8,12 +8,22 @@
 
 namespace stereotrack::config {
 
-/// How the source's pictures are to be understood: a property of the recording, not of the tracker.
+/// What the daemon does at the end of a film: recordings and scenes are played from memory.
+enum class Repeat : unsigned char {
+  kBounce,  ///< backwards, and so to and fro: nothing jumps
+  kLoop,    ///< from the beginning
+  kOnce,    ///< the daemon ends
+};
+
+/// Where pictures come from and how they are to be understood: a property of the rig or recording, not of the tracker.
 struct SourceConfig {
-  double fps = 30.0;   ///< pairs per second, used only where the source itself has no times [1/s]
-  bool flip = false;   ///< both views stand on their head: turn them top to bottom
-  bool swap = false;   ///< what the source calls left is the right view
-  int shift_rows = 0;  ///< rows the right picture is moved down, negative: up [px]
+  std::string name;                 ///< synthetic:NAME; stereotrackd alone, stereotrack is told on the command line
+  Repeat repeat = Repeat::kBounce;  ///< stereotrackd alone
+  int memory_mb = 1024;             ///< most that a film may take [MB]; stereotrackd alone
+  double fps = 30.0;                ///< pairs per second, used only where the source itself has no times [1/s]
+  bool flip = false;                ///< both views stand on their head: turn them top to bottom
+  bool swap = false;                ///< what the source calls left is the right view
+  int shift_rows = 0;               ///< rows the right picture is moved down, negative: up [px]
 };
 
 /// What `synthetic:NAME` draws; no other source looks at it.
@@ -25,11 +35,57 @@ struct SyntheticConfig {
 };
 
 /// The latency contract: a result leaves at capture time + output_ms, neither earlier nor later.
+/// See firmware-app/runtime/output_schedule.hpp.
 struct LatencyConfig {
   double output_ms = 50.0;  ///< [ms]
+  double lead_ms = 0.8;     ///< [ms]
+  double grace_ms = 2.0;    ///< [ms]
+  double stale_ms = 500.0;  ///< over output_ms [ms]
+  int missing_limit = 30;
+};
+
+/// How one thread of the daemon runs.
+struct ThreadConfig {
+  int priority = 0;  ///< 1..99: SCHED_FIFO; 0: the ordinary scheduler
+  int core = -1;     ///< -1: any
+};
+
+/// What to do where the system does not grant what real time needs.
+enum class RealTimeMode : unsigned char {
+  kEnforce,  ///< refuse to start
+  kTry,      ///< go on and say what is missing
+  kOff,      ///< ask for nothing: a PC that replays
+};
+
+struct RealTimeConfig {
+  RealTimeMode mode = RealTimeMode::kTry;
+  bool deep_sleep = false;
+  ThreadConfig publisher{.priority = 82};
+  ThreadConfig capture{.priority = 81};
+  ThreadConfig frames{.priority = 80};
+  ThreadConfig service{.priority = 0};
+};
+
+/// What is left out when the time runs out. See firmware-app/runtime/effort.hpp.
+struct ShedConfig {
+  std::vector<std::string> order{"level_set", "background_disparity", "corners", "dense_map"};
+  double above = 0.9;
+  double below = 0.6;
+  int after_frames = 3;
+  int restore_frames = 60;
+};
+
+struct MetricsConfig {
+  std::string listen;  ///< ADDR:PORT of the Prometheus endpoint; empty: none
+  std::string file;    ///< rewritten every second; empty: none
+};
+
+struct ServiceConfig {
+  std::string state_directory;  ///< empty: $STATE_DIRECTORY, else ~/.local/state/stereotrack
 };
 
 struct CalibrationConfig {
+  std::string file;     ///< of the rig; stereotrackd alone
   double unit_m = 0.0;  ///< metres in one unit of the calibration's T; 0 = unset, the calibration's own if it has one
 };
 
@@ -45,6 +101,10 @@ struct Configuration {
   SourceConfig source;
   SyntheticConfig synthetic;
   LatencyConfig latency;
+  RealTimeConfig realtime;
+  ShedConfig shed;
+  MetricsConfig metrics;
+  ServiceConfig service;
   CalibrationConfig calibration;
   TelemetryConfig telemetry;
   PipelineConfig pipeline;  ///< the stages' own Configs, see pipeline/pipeline_config.hpp

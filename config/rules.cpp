@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "config/schema.hpp"
+#include "pipeline/effort.hpp"
 
 namespace stereotrack::config {
 namespace {
@@ -31,6 +32,33 @@ std::string split_stays_split(const Configuration& c) {
   return "merge_depth is above split_depth, what is split would be merged again: give merge_depth <= split_depth";
 }
 
+std::string efforts_are_known(const Configuration& c) {
+  std::string known;
+  for (std::size_t i = 0; i < kEfforts; ++i)
+    known += (i == 0 ? "" : ", ") + std::string(to_string(static_cast<Effort>(i)));
+  for (const std::string& name : c.shed.order) {
+    const auto is_it = [&](std::size_t i) { return name == to_string(static_cast<Effort>(i)); };
+    bool found = false;
+    for (std::size_t i = 0; i < kEfforts; ++i) found = found || is_it(i);
+    if (!found) return quoted(name) + " is no effort: there are " + known;
+    if (std::count(c.shed.order.begin(), c.shed.order.end(), name) > 1) {
+      return quoted(name) + " stands there twice: name each effort once";
+    }
+  }
+  return {};
+}
+
+std::string shed_leaves_a_gap(const Configuration& c) {
+  if (c.shed.below < c.shed.above) return {};
+  return "shed.below is not under shed.above, efforts would come and go in turns: give below < above";
+}
+
+std::string decided_before_it_leaves(const Configuration& c) {
+  if (c.latency.lead_ms < c.latency.output_ms) return {};
+  return "lead_ms is not under output_ms, a result would be decided before its picture is taken: give lead_ms < "
+         "output_ms";
+}
+
 /// Set by the user, not by a preset or a default.
 bool said_by_user(const Loaded& loaded, std::string_view key) {
   const auto origin = loaded.origins.find(key);
@@ -44,6 +72,9 @@ std::span<const Rule> rules() {
       {"telemetry_destinations_differ", {"telemetry.destinations"}, destinations_differ},
       {"seeds_over_candidates", {"foreground.low_sd", "foreground.high_sd"}, seeds_over_candidates},
       {"level_set_has_iterations", {"level_set.iterations", "level_set.on"}, level_set_has_iterations},
+      {"efforts_are_known", {"shed.order"}, efforts_are_known},
+      {"shed_leaves_a_gap", {"shed.below", "shed.above"}, shed_leaves_a_gap},
+      {"decided_before_it_leaves", {"latency.lead_ms", "latency.output_ms"}, decided_before_it_leaves},
       {"split_stays_split", {"objects.merge_depth", "objects.split_depth"}, split_stays_split},
   };
   return all;

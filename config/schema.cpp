@@ -23,13 +23,28 @@ std::string check_destination(std::string_view text) {
   return quoted(text) + " is not ADDR:PORT: write it like \"192.168.1.10:9000\" or \"[fe80::1]:9000\"";
 }
 
+void add_thread(std::vector<Key>& keys, const std::string& thread, ThreadConfig& config, std::string_view does) {
+  keys.push_back(key("thread." + thread + ".priority", config.priority, 0, 99, "",
+                     "Real-time priority of the thread that " + std::string(does) +
+                         "; 0: the ordinary scheduler. Kernel threads for interrupts have 50."));
+  keys.push_back(key("thread." + thread + ".core", config.core, -1, 1023, "", "The core it is bound to; -1: any."));
+}
+
 }  // namespace
 
 std::vector<Key> keys_of(Configuration& c) {
   PipelineConfig& p = c.pipeline;
-  return {
+  std::vector<Key> keys = {
       key("preset", c.preset, preset_names(), "Which preset gives the values that are not given here."),
 
+      key("source.name", c.source.name, nullptr,
+          "What stereotrackd watches: synthetic:NAME, drawn into memory at start and played in real time. stereotrack "
+          "is told its source on the command line."),
+      key("source.repeat", c.source.repeat,
+          {{"bounce", Repeat::kBounce}, {"loop", Repeat::kLoop}, {"once", Repeat::kOnce}},
+          "At the end of what stereotrackd plays from memory: go backwards, begin anew, or end."),
+      key("source.memory_mb", c.source.memory_mb, 1, 1048576, "MB",
+          "Most memory that what is played may take; more is refused at start."),
       key("source.fps", c.source.fps, 0.1, 1000, "1/s",
           "Pairs per second, used only where the source itself has no times: every speed follows from it."),
       key("source.flip", c.source.flip, "Turns both views top to bottom, for cameras that hang upside down."),
@@ -48,6 +63,42 @@ std::vector<Key> keys_of(Configuration& c) {
       key("latency.output_ms", c.latency.output_ms, 1, 10000, "ms",
           "Time from the middle of the exposure to the moment its result is sent: longer misses fewer deadlines, "
           "shorter predicts less."),
+      key("latency.lead_ms", c.latency.lead_ms, 0, 1000, "ms",
+          "How long before that moment the publisher decides what leaves, predicts and encodes it: a result that comes "
+          "later is late."),
+      key("latency.grace_ms", c.latency.grace_ms, 0, 1000, "ms",
+          "How long after that moment a result may still leave, flagged, when the publisher was kept from running."),
+      key("latency.stale_ms", c.latency.stale_ms, 0, 60000, "ms",
+          "When no result comes, targets go on as predicted for so long beyond output_ms; then none leaves."),
+      key("latency.missing_limit", c.latency.missing_limit, 1, 100000, "pairs",
+          "So many pairs in a row that do not come are told, one by one; then status alone, until one comes."),
+
+      key("realtime.mode", c.realtime.mode,
+          {{"enforce", RealTimeMode::kEnforce}, {"try", RealTimeMode::kTry}, {"off", RealTimeMode::kOff}},
+          "Where a right that real time needs is missing: refuse to start, say so and go on, or ask for none."),
+      key("realtime.deep_sleep", c.realtime.deep_sleep,
+          "Lets cores sleep as deeply as they like: saves power, and wakes up to milliseconds late."),
+
+      key("shed.order", c.shed.order, nullptr,
+          "What is left out when the time runs out, first to go first; what is not named never is."),
+      key("shed.above", c.shed.above, 0.01, 1, "budget",
+          "Part of the time that there is from which a frame is heavy; one that takes all of it sheds at once."),
+      key("shed.below", c.shed.below, 0.01, 1, "budget", "Part of it under which a frame is light."),
+      key("shed.after_frames", c.shed.after_frames, 1, 10000, "frames", "Heavy frames in a row that shed one more."),
+      key("shed.restore_frames", c.shed.restore_frames, 1, 100000, "frames",
+          "Light frames in a row that bring one back, on trial: each trial that fails doubles them."),
+
+      key("metrics.listen", c.metrics.listen, nullptr,
+          "ADDR:PORT where stereotrackd serves its figures as Prometheus text under /metrics; empty: nowhere."),
+      key("metrics.file", c.metrics.file, nullptr,
+          "File that stereotrackd writes the same text to every second, whole each time; empty: none."),
+
+      key("service.state_directory", c.service.state_directory, nullptr,
+          "Where the number of the session is kept; empty: $STATE_DIRECTORY, which systemd sets, else "
+          "~/.local/state/stereotrack."),
+
+      key("calibration.file", c.calibration.file, nullptr,
+          "Calibration of the rig that stereotrackd watches; a synthetic scene has its own."),
 
       key("calibration.unit_m", c.calibration.unit_m, 0, 1000, "m per unit of T",
           "Metres in one length unit of the calibration file; 0: as the file's format says (Kalibr, ROS, EuRoC, KITTI: "
@@ -189,6 +240,11 @@ std::vector<Key> keys_of(Configuration& c) {
       key("track.straight_part", p.track.straight_part, 0, 1, "path",
           "Part of its path that this way must be: flicker jumps to and fro."),
   };
+  add_thread(keys, "publisher", c.realtime.publisher, "lets results leave: the highest, it runs for microseconds");
+  add_thread(keys, "capture", c.realtime.capture, "takes frames from the sensors");
+  add_thread(keys, "frames", c.realtime.frames, "runs the pipeline");
+  add_thread(keys, "service", c.realtime.service, "logs, serves figures and feeds the watchdog");
+  return keys;
 }
 
 namespace {

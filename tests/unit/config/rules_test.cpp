@@ -72,6 +72,28 @@ TEST(Rules, MergingWhatWasSplitIsRefused) {
             0U);
 }
 
+TEST(Rules, EffortsAreNamedAsTheyAreCalledAndOnce) {
+  EXPECT_EQ(refused({override_layer("shed.order=corners,dense_map")}), "");
+  EXPECT_EQ(refused({override_layer("shed.order=[]")}), "");
+  EXPECT_EQ(refused({text_layer("rig.toml", "shed.order = [\"corner\"]")}),
+            "rig.toml:1:14: shed.order: \"corner\" is no effort: there are level_set, corners, background_disparity, "
+            "dense_map");
+  EXPECT_NE(refused({override_layer("shed.order=corners,corners")}).find("\"corners\" stands there twice"),
+            std::string::npos);
+}
+
+TEST(Rules, ShedFractionsMustLeaveAGap) {
+  EXPECT_EQ(refused({override_layer("shed.below=0.5"), override_layer("shed.above=0.51")}), "");
+  EXPECT_NE(refused({override_layer("shed.below=0.9")}).find("shed.below is not under shed.above"), std::string::npos);
+}
+
+TEST(Rules, WhatLeavesIsDecidedAfterItsPictureIsTaken) {
+  EXPECT_EQ(refused({override_layer("latency.output_ms=1")}), "");
+  EXPECT_NE(refused({override_layer("latency.output_ms=1"), override_layer("latency.lead_ms=1")})
+                .find("lead_ms is not under output_ms"),
+            std::string::npos);
+}
+
 TEST(Metres, KeyInMetresNeedsAKnownUnit) {
   struct {
     double reach = 0;
