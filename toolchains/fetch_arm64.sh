@@ -9,7 +9,8 @@
 #     toolchains/fetch_arm64.sh FOLDER
 set -euo pipefail
 
-packages=(libhwy1 libhwy-dev libgtest-dev libgmock-dev libeigen3-dev libexpected-dev libcli11-dev libtomlplusplus-dev libnanopb-dev)
+packages=(libhwy1 libhwy-dev libgtest-dev libgmock-dev libeigen3-dev libexpected-dev libcli11-dev libtomlplusplus-dev
+  libnanopb-dev libsodium23 libsodium-dev)
 
 (($# == 1)) || {
   echo "usage: fetch_arm64.sh FOLDER" >&2

@@ -63,6 +63,62 @@ tl::expected<Target, Refusal> read(const stereotrack_Target& in) noexcept {
   return out;
 }
 
+Live read(const stereotrack_Live& in) noexcept {
+  using std::chrono::nanoseconds;
+  Live out;
+  out.tai_offset = nanoseconds(in.tai_offset_ns);
+  if (in.tai_error_ns != 0) out.tai_error = nanoseconds(in.tai_error_ns);
+  if (in.has_pair_skew_ns) out.pair_skew = nanoseconds(in.pair_skew_ns);
+  out.exposure_left_us = in.exposure_left_us;
+  out.exposure_right_us = in.exposure_right_us;
+  if (in.has_send_error_ns) out.send_error = nanoseconds(in.send_error_ns);
+  out.efforts_shed = in.efforts_shed;
+  out.health = in.health;
+  return out;
+}
+
+Status read(const stereotrack_Status& in) noexcept {
+  Status out;
+  out.uptime_ms = in.uptime_ms;
+  out.health = in.health;
+  out.efforts_shed = in.efforts_shed;
+  out.latency_us = in.latency_us;
+  out.period_us = in.period_us;
+  out.pairs_captured = in.pairs_captured;
+  out.pairs_evicted = in.pairs_evicted;
+  out.pairs_skipped = in.pairs_skipped;
+  out.pairs_starved = in.pairs_starved;
+  out.unpaired_left = in.unpaired_left;
+  out.unpaired_right = in.unpaired_right;
+  out.outputs_on_time = in.outputs_on_time;
+  out.outputs_predicted = in.outputs_predicted;
+  out.outputs_missing = in.outputs_missing;
+  out.outputs_overslept = in.outputs_overslept;
+  out.late_results = in.late_results;
+  out.deadline_misses = in.deadline_misses;
+  out.allocations = in.allocations;
+  out.telemetry_sent = in.telemetry_sent;
+  out.telemetry_dropped = in.telemetry_dropped;
+  out.telemetry_failed = in.telemetry_failed;
+  out.recordings_dropped = in.recordings_dropped;
+  out.lines_failed = in.lines_failed;
+  out.clock_steps = in.clock_steps;
+  out.efforts_shed_count = in.efforts_shed_count;
+  out.pair_buffers = in.pair_buffers;
+  out.pair_buffers_free_low = in.pair_buffers_free_low;
+  out.pairs_waiting_high = in.pairs_waiting_high;
+  out.recorder_slots = in.recorder_slots;
+  out.recorder_slots_free_low = in.recorder_slots_free_low;
+  out.compute_p50_us = in.compute_p50_us;
+  out.compute_p99_us = in.compute_p99_us;
+  out.compute_max_us = in.compute_max_us;
+  out.send_error_p50_us = in.send_error_p50_us;
+  out.send_error_p99_us = in.send_error_p99_us;
+  out.send_error_max_us = in.send_error_max_us;
+  out.skew_max_us = in.skew_max_us;
+  return out;
+}
+
 }  // namespace
 
 tl::expected<Datagram, Refusal> decode(std::span<const std::byte> bytes) noexcept {
@@ -76,7 +132,9 @@ tl::expected<Datagram, Refusal> decode(std::span<const std::byte> bytes) noexcep
   if (in.schema == kSchemaVersion && in.size > bytes.size()) return tl::unexpected(Refusal::kTruncated);
   if (!decoded) return tl::unexpected(Refusal::kMalformed);
   if (in.schema == 0) return tl::unexpected(Refusal::kUnknownSchema);
-  if (in.size == 0 || in.sequence == 0 || in.part == 0 || in.part > in.parts || in.parts > kMaxParts) {
+  if (in.size == 0 || in.part == 0 || in.part > in.parts || in.parts > kMaxParts ||
+      (in.has_status ? in.sequence != 0 || in.status.sequence == 0 || in.parts != 1 || in.targets_count != 0
+                     : in.sequence == 0)) {
     return tl::unexpected(Refusal::kInconsistent);
   }
   if (!std::isfinite(in.unit_m) || in.unit_m < 0) return tl::unexpected(Refusal::kNotFinite);
@@ -97,6 +155,11 @@ tl::expected<Datagram, Refusal> decode(std::span<const std::byte> bytes) noexcep
                 in.targets_dropped,
                 in.targets_refused,
                 in.unit_m};
+  if (in.has_live) out.live = read(in.live);
+  if (in.has_status) {
+    out.status = read(in.status);
+    out.status_sequence = in.status.sequence;
+  }
   for (std::size_t i = 0; i < in.targets_count; ++i) {
     const auto target = read(in.targets[i]);
     if (!target) return tl::unexpected(target.error());
@@ -157,6 +220,11 @@ Outcome Receiver::accept(std::span<const std::byte> bytes) noexcept {
   const auto decoded = decode(bytes);
   if (!decoded) return refuse(decoded.error());
   const Header& header = decoded->header;
+  if (decoded->status) {
+    last_ = *decoded;
+    ++counters_.statuses;
+    return Outcome::kStatus;
+  }
   Stream& stream = stream_of(header);
   stream.last_used = counters_.datagrams;
 
@@ -184,6 +252,7 @@ Outcome Receiver::accept(std::span<const std::byte> bytes) noexcept {
     slot.parts = header.parts;
     slot.have = 0;
     slot.header = header;
+    slot.live = decoded->live;
   }
   if (header.sequence < stream.highest || slot.have > bit) ++counters_.reordered;
   slot.have |= bit;
@@ -196,6 +265,7 @@ Outcome Receiver::accept(std::span<const std::byte> bytes) noexcept {
   ++stream.complete;
   ++counters_.pairs;
   pair_.header = slot.header;
+  pair_.live = slot.live;
   pair_.targets.clear();
   for (std::uint32_t part = 0; part < slot.parts; ++part) {
     for (const Target& target : slot.targets[part]) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <tl/expected.hpp>
 #include <vector>
@@ -46,6 +47,7 @@ enum class Outcome : std::uint8_t {
   kStale,      ///< over kWindow messages old: too late to be used, already counted as lost
   kPart,       ///< new; other parts of its message are missing still. See datagram()
   kPair,       ///< new, and completes its message. See datagram() and pair()
+  kStatus,     ///< no message about a pair: datagram().status
 };
 
 struct ReceiverCounters {
@@ -55,6 +57,7 @@ struct ReceiverCounters {
   std::uint64_t stale = 0;       ///< came over kWindow messages late
   std::uint64_t restarts = 0;    ///< a stream whose sequence began again
   std::uint64_t pairs = 0;       ///< messages that are complete
+  std::uint64_t statuses = 0;    ///< datagrams with a status
   std::array<std::uint64_t, kRefusals> refused{};
 
   [[nodiscard]] std::uint64_t refused_total() const noexcept {
@@ -95,6 +98,7 @@ class Receiver {
     std::uint32_t parts = 0;
     std::uint32_t have = 0;  ///< bit per part
     Header header;
+    std::optional<Live> live;
     std::array<FixedVector<Target, kTargetsPerPart>, kMaxParts> targets;
 
     [[nodiscard]] bool complete() const noexcept { return have + 1 == 1U << parts; }

@@ -73,8 +73,8 @@ TEST(Decode, StoredDatagramOfEverySchemaIsStillUnderstood) {
 TEST(Decode, UnknownFieldsOfANewerSenderAreSkipped) {
   const Bytes known = stream(1, 2)[0][0];
   Bytes newer = known;
-  // Field 19, varint 5; field 2047, 4 bytes: numbers that are reserved today.
-  for (const int byte : {0x98, 0x01, 0x05, 0xFA, 0x7F, 0x04, 1, 2, 3, 4}) newer.push_back(static_cast<std::byte>(byte));
+  // Field 21, varint 5; field 2045, 4 bytes: numbers that are reserved today.
+  for (const int byte : {0xA8, 0x01, 0x05, 0xEA, 0x7F, 0x04, 1, 2, 3, 4}) newer.push_back(static_cast<std::byte>(byte));
   const auto datagram = decode(newer);
   ASSERT_TRUE(datagram.has_value()) << to_string(datagram.error());
   EXPECT_EQ(datagram->targets.size(), 2U);
