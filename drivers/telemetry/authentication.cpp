@@ -1,9 +1,18 @@
 #include "drivers/telemetry/authentication.hpp"
 
+#include <fcntl.h>
 #include <sodium.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <charconv>
 #include <cstring>
+#include <string>
+#include <string_view>
+
+#include "drivers/telemetry/endpoint.hpp"
 
 namespace stereotrack::telemetry {
 namespace {
@@ -27,11 +36,102 @@ Hash hash_of(std::span<const std::byte> bytes, const Key& key) noexcept {
   return hash;
 }
 
+constexpr std::size_t kMostFileBytes = 16 * 1024;
+
+/// Memory that held secrets is wiped before it is given back.
+struct SecretText {
+  std::array<char, kMostFileBytes> bytes{};
+  std::size_t size = 0;
+
+  SecretText() = default;
+  SecretText(const SecretText&) = delete;
+  SecretText& operator=(const SecretText&) = delete;
+  ~SecretText() { sodium_memzero(bytes.data(), bytes.size()); }
+};
+
+void start_sodium() {
+  if (sodium_init() < 0) throw std::runtime_error("libsodium cannot be used: telemetry cannot be authenticated");
+}
+
+std::string_view trimmed(std::string_view text) noexcept {
+  constexpr std::string_view kBlank = " \t\r";
+  const std::size_t begin = text.find_first_not_of(kBlank);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
+}
+
+/// False if it is not ID HEX.
+bool parse_key(std::string_view line, Key& key) noexcept {
+  const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), key.id);
+  if (error != std::errc{}) return false;
+  std::string_view digits = line.substr(static_cast<std::size_t>(end - line.data()));
+  if (digits.empty() || (digits.front() != ' ' && digits.front() != '\t')) return false;
+  digits = trimmed(digits);
+  std::size_t size = 0;
+  return digits.size() == 2 * kKeyBytes &&
+         sodium_hex2bin(key.secret.data(), kKeyBytes, digits.data(), digits.size(), nullptr, &size, nullptr) == 0 &&
+         size == kKeyBytes;
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
+  throw KeyFileError("key file " + path.string() + ": " + why);
+}
+
+void read_secret(const std::filesystem::path& path, SecretText& text) {
+  // O_NONBLOCK: a pipe must not hang the start. What is checked is what was opened, not what the name means later.
+  const Socket file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
+  if (file.fd() < 0) {
+    refuse(path, std::string("cannot be read: ") + std::strerror(errno) +
+                     "; make one with: (umask 077 && echo \"1 $(openssl rand -hex 32)\" > FILE)");
+  }
+  struct stat facts {};
+  if (::fstat(file.fd(), &facts) != 0 || !S_ISREG(facts.st_mode)) refuse(path, "is no file; name the file itself");
+  if (facts.st_uid != 0 && facts.st_uid != ::geteuid()) {
+    refuse(path, "belongs to another user, who could change it; chown it to the user who runs this program");
+  }
+  if ((facts.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+    refuse(path, "others may read or write it; run: chmod 600 " + path.string());
+  }
+  while (text.size < text.bytes.size()) {
+    const ssize_t got = ::read(file.fd(), text.bytes.data() + text.size, text.bytes.size() - text.size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) refuse(path, std::string("cannot be read: ") + std::strerror(errno));
+    if (got == 0) return;
+    text.size += static_cast<std::size_t>(got);
+  }
+  refuse(path, "is larger than " + std::to_string(kMostFileBytes) + " bytes: is it the right file?");
+}
+
 }  // namespace
 
-Signer::Signer(const Key& key) : key_(key) {
-  if (sodium_init() < 0) throw std::runtime_error("libsodium cannot be used: telemetry cannot be signed");
+std::vector<Key> load_key_file(const std::filesystem::path& path) {
+  start_sodium();
+  SecretText text;
+  read_secret(path, text);
+  std::vector<Key> keys;
+  keys.reserve(kMaxKeys);
+  std::string_view rest(text.bytes.data(), text.size);
+  for (int number = 1; !rest.empty(); ++number) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view line = trimmed(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (line.empty() || line.front() == '#') continue;
+    // The line itself is not repeated in messages: it is a secret.
+    const std::string where = "line " + std::to_string(number) + ": ";
+    Key key;
+    if (!parse_key(line, key)) refuse(path, where + "write ID HEX: a number and 64 hexadecimal digits");
+    if (std::ranges::find(keys, key.id, &Key::id) != keys.end()) {
+      refuse(path, where + "key id " + std::to_string(key.id) + " stands there twice; give each key its own");
+    }
+    if (keys.size() == kMaxKeys)
+      refuse(path, where + "more than " + std::to_string(kMaxKeys) + " keys; remove old ones");
+    keys.push_back(key);
+  }
+  if (keys.empty()) refuse(path, "holds no key; write one as ID HEX: a number and 64 hexadecimal digits");
+  return keys;
 }
+
+Signer::Signer(const Key& key) : key_(key) { start_sodium(); }
 
 Signer::~Signer() { sodium_memzero(key_.secret.data(), key_.secret.size()); }
 

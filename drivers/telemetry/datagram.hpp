@@ -65,6 +65,8 @@ struct Live {
   std::optional<std::chrono::nanoseconds> send_error;  ///< of the message before: sent - due
   std::uint8_t efforts_shed = 0;                       ///< runtime::EffortBits
   std::uint32_t health = 0;                            ///< sum of Health
+
+  [[nodiscard]] bool operator==(const Live&) const noexcept = default;
 };
 
 /// Every second. Counts are since the session began; low and high are extremes since then. Each field's full meaning:
@@ -112,6 +114,8 @@ struct Status {
   std::uint32_t send_error_p99_us = 0;
   std::uint32_t send_error_max_us = 0;
   std::uint32_t skew_max_us = 0;
+
+  [[nodiscard]] bool operator==(const Status&) const noexcept = default;
 };
 
 enum class TargetState : std::uint8_t {
@@ -165,7 +169,8 @@ struct Header {
   std::uint32_t tracks_dropped = 0;
   std::uint32_t targets_dropped = 0;
   std::uint32_t targets_refused = 0;
-  float unit_m = 0;  ///< 0 = not known
+  float unit_m = 0;        ///< 0 = not known
+  std::uint32_t size = 0;  ///< bytes of the payload, that is of the datagram without its trailer
 };
 
 struct Datagram {

@@ -119,6 +119,13 @@ Status read(const stereotrack_Status& in) noexcept {
   return out;
 }
 
+/// What lies behind the payload is the beginning of a trailer.
+bool is_cut_trailer(std::span<const std::byte> rest) noexcept {
+  constexpr std::array kBegin{std::byte{0xF5}, std::byte{0x7F}};
+  return !rest.empty() && rest.size() < kTrailerBytes &&
+         std::equal(rest.begin(), rest.begin() + std::min(rest.size(), kBegin.size()), kBegin.begin());
+}
+
 }  // namespace
 
 tl::expected<Datagram, Refusal> decode(std::span<const std::byte> bytes) noexcept {
@@ -129,7 +136,9 @@ tl::expected<Datagram, Refusal> decode(std::span<const std::byte> bytes) noexcep
   const bool decoded = pb_decode(&stream, stereotrack_Datagram_fields, &in);
   // A cut or newer datagram is told as such where its first fields could still be read.
   if (in.schema != 0 && in.schema != kSchemaVersion) return tl::unexpected(Refusal::kUnknownSchema);
-  if (in.schema == kSchemaVersion && in.size > bytes.size()) return tl::unexpected(Refusal::kTruncated);
+  if (in.schema == kSchemaVersion && (in.size > bytes.size() || is_cut_trailer(bytes.subspan(in.size)))) {
+    return tl::unexpected(Refusal::kTruncated);
+  }
   if (!decoded) return tl::unexpected(Refusal::kMalformed);
   if (in.schema == 0) return tl::unexpected(Refusal::kUnknownSchema);
   if (in.size == 0 || in.part == 0 || in.part > in.parts || in.parts > kMaxParts ||
@@ -154,7 +163,8 @@ tl::expected<Datagram, Refusal> decode(std::span<const std::byte> bytes) noexcep
                 in.tracks_dropped,
                 in.targets_dropped,
                 in.targets_refused,
-                in.unit_m};
+                in.unit_m,
+                in.size};
   if (in.has_live) out.live = read(in.live);
   if (in.has_status) {
     out.status = read(in.status);
@@ -183,7 +193,7 @@ void Receiver::Stream::begin(const Header& header) noexcept {
   for (Slot& slot : slots) slot.sequence = 0;
 }
 
-Receiver::Receiver() : streams_(kStreams) {}
+Receiver::Receiver(std::vector<Key> keys) : keys_(std::move(keys)), streams_(kStreams) {}
 
 std::uint64_t Receiver::lost() const noexcept {
   std::uint64_t sum = lost_before_;
@@ -215,9 +225,34 @@ Receiver::Stream& Receiver::stream_of(const Header& header) noexcept {
   return *oldest;
 }
 
+tl::expected<Datagram, Refusal> Receiver::authenticate(std::span<const std::byte> bytes) noexcept {
+  if (bytes.size() > kMaxDatagramBytes) return tl::unexpected(Refusal::kOversized);
+  switch (check_seal(bytes, keys_)) {
+    case Seal::kGood: break;
+    case Seal::kUnknownKey: return tl::unexpected(Refusal::kUnknownKey);
+    case Seal::kWrong: return tl::unexpected(Refusal::kForged);
+    case Seal::kNone: {
+      // Refused in any case: only the reason is looked for. Behind a whole payload something else than a trailer
+      // stands.
+      const auto unsigned_one = decode(bytes);
+      if (!unsigned_one) return unsigned_one;
+      return tl::unexpected(unsigned_one->header.size == bytes.size() ? Refusal::kUnsigned : Refusal::kForged);
+    }
+  }
+  auto decoded = decode(bytes);
+  if (!decoded) return decoded;
+  switch (guard_.admit(*decoded)) {
+    case ReplayGuard::Verdict::kFresh: break;
+    case ReplayGuard::Verdict::kReplayed: return tl::unexpected(Refusal::kReplayed);
+    case ReplayGuard::Verdict::kOldSession: return tl::unexpected(Refusal::kOldSession);
+    case ReplayGuard::Verdict::kTooManyRigs: return tl::unexpected(Refusal::kTooManyRigs);
+  }
+  return decoded;
+}
+
 Outcome Receiver::accept(std::span<const std::byte> bytes) noexcept {
   ++counters_.datagrams;
-  const auto decoded = decode(bytes);
+  const auto decoded = keys_.empty() ? decode(bytes) : authenticate(bytes);
   if (!decoded) return refuse(decoded.error());
   const Header& header = decoded->header;
   if (decoded->status) {

@@ -8,7 +8,9 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/datagram.hpp"
+#include "drivers/telemetry/replay_guard.hpp"
 
 namespace stereotrack::telemetry {
 
@@ -21,8 +23,15 @@ enum class Refusal : std::uint8_t {
   kTruncated,      ///< shorter than it says it is
   kInconsistent,   ///< fields contradict each other: part 3 of 2, two numbers for a position
   kNotFinite,      ///< a NaN or an infinity
+  // By a receiver that has keys:
+  kUnsigned,     ///< whole, and without a trailer
+  kUnknownKey,   ///< signed with a key that is not among ours
+  kForged,       ///< the hash is not that of these bytes: forged, or altered on the way
+  kReplayed,     ///< was there before, or comes too late to tell
+  kOldSession,   ///< of a session under the highest that was seen of its rig
+  kTooManyRigs,  ///< well signed, but there is no room to remember one more rig
 };
-inline constexpr std::size_t kRefusals = 7;
+inline constexpr std::size_t kRefusals = 13;
 
 [[nodiscard]] constexpr const char* to_string(Refusal refusal) noexcept {
   switch (refusal) {
@@ -33,6 +42,12 @@ inline constexpr std::size_t kRefusals = 7;
     case Refusal::kTruncated: return "truncated";
     case Refusal::kInconsistent: return "inconsistent";
     case Refusal::kNotFinite: return "not finite";
+    case Refusal::kUnsigned: return "unsigned";
+    case Refusal::kUnknownKey: return "unknown key";
+    case Refusal::kForged: return "forged";
+    case Refusal::kReplayed: return "replayed";
+    case Refusal::kOldSession: return "old session";
+    case Refusal::kTooManyRigs: return "too many rigs";
   }
   return "unknown";
 }
@@ -71,6 +86,9 @@ struct ReceiverCounters {
 ///     lost = highest sequence - first sequence + 1 - complete messages - (1 if the newest is incomplete)
 /// so that a part that comes late, but within kWindow messages, takes its loss back. A sequence that
 /// begins again at 1, or lies over 1024 back, is a sender that restarted under the same session.
+/// With keys it takes only what is signed with one of them, once each (ReplayGuard), and of the highest session of each
+/// rig: a repetition is kRefused, never kDuplicate, and a sender that begins again must raise its session. Without keys
+/// it takes signed datagrams as well, and does not look at the signature.
 /// Memory is taken when made; accept() takes none and is O(1). kStreams streams; a further one takes the
 /// place of that which has been silent longest. One thread.
 class Receiver {
@@ -78,7 +96,8 @@ class Receiver {
   static constexpr std::size_t kWindow = 8;   ///< messages that may be incomplete at a time
   static constexpr std::size_t kStreams = 8;  ///< (rig, session) followed at a time
 
-  Receiver();
+  Receiver() : Receiver(std::vector<Key>{}) {}
+  explicit Receiver(std::vector<Key> keys);
 
   Outcome accept(std::span<const std::byte> bytes) noexcept;
 
@@ -86,6 +105,9 @@ class Receiver {
   [[nodiscard]] const Datagram& datagram() const noexcept { return last_; }  ///< after anything else
   [[nodiscard]] const Pair& pair() const noexcept { return pair_; }          ///< after kPair
   [[nodiscard]] const ReceiverCounters& counters() const noexcept { return counters_; }
+  /// Of a receiver with keys: what it has seen, to be kept (save_marks) and given to a later one's restore().
+  [[nodiscard]] std::span<const Mark> marks() const noexcept { return guard_.marks(); }
+  void restore(std::span<const Mark> marks) noexcept { guard_.restore(marks); }
 
   /// Messages lost or incomplete: all streams, ended ones too.
   [[nodiscard]] std::uint64_t lost() const noexcept;
@@ -118,7 +140,10 @@ class Receiver {
 
   Stream& stream_of(const Header& header) noexcept;
   Outcome refuse(Refusal refusal) noexcept;
+  [[nodiscard]] tl::expected<Datagram, Refusal> authenticate(std::span<const std::byte> bytes) noexcept;
 
+  std::vector<Key> keys_;  ///< none: anybody is believed
+  ReplayGuard guard_;
   std::vector<Stream> streams_;
   Datagram last_;
   Pair pair_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <new>
 #include <random>
@@ -113,6 +114,103 @@ TEST(Encoder, StoredDatagramIsReproducedByteForByte) {
   EXPECT_EQ(encode(encoder, golden_message(list)), stored);
 }
 
+TEST(Encoder, StoredDatagramsOfALiveRigAreReproducedByteForByte) {
+  const auto stored = read_hex(STEREOTRACK_SOURCE_DIR "/tests/unit/telemetry/datagrams_live_v1.hex");
+  ASSERT_EQ(stored.size(), 3U);
+  const auto list = golden_tracks();
+  const Message message = golden_live_message(list);
+  Encoder encoder(kGoldenConfig);
+  EXPECT_EQ(encode(encoder, message)[0], stored[0]);
+  Encoder status_encoder(kGoldenConfig);
+  EXPECT_EQ(encode_status(status_encoder, golden_status(), golden_live_without_pair(), message.send_time), stored[1]);
+  const Signer signer(kGoldenKey);
+  Encoder signing({.rig = kGoldenConfig.rig, .session = kGoldenConfig.session, .signer = &signer});
+  EXPECT_EQ(encode(signing, message)[0], stored[2]);
+}
+
+TEST(Encoder, WhatALiveRigAddsStandsInEveryPartAndComesBack) {
+  Encoder encoder(kGoldenConfig);
+  const auto list = tracks(20);
+  Message message = golden_message(list);
+  message.live = golden_live();
+  const auto datagrams = encode(encoder, message);
+  ASSERT_EQ(datagrams.size(), 3U);
+  for (const Bytes& bytes : datagrams) {
+    const auto datagram = decode(bytes);
+    ASSERT_TRUE(datagram.has_value());
+    ASSERT_TRUE(datagram->live.has_value());
+    EXPECT_FALSE(datagram->status.has_value());
+    EXPECT_TRUE(*datagram->live == golden_live());
+  }
+}
+
+TEST(Encoder, WhatALiveRigDoesNotKnowIsAbsentAndZeroIsAValue) {
+  Encoder encoder(kGoldenConfig);
+  Message message;
+  message.live.emplace();
+  auto datagram = decode(encode(encoder, message)[0]);
+  ASSERT_TRUE(datagram && datagram->live);
+  EXPECT_TRUE(*datagram->live == Live{});
+  message.live->tai_error = message.live->pair_skew = message.live->send_error = std::chrono::nanoseconds(0);
+  datagram = decode(encode(encoder, message)[0]);
+  ASSERT_TRUE(datagram && datagram->live);
+  EXPECT_EQ(datagram->live->pair_skew, std::chrono::nanoseconds(0));
+  EXPECT_EQ(datagram->live->send_error, std::chrono::nanoseconds(0));
+  EXPECT_EQ(datagram->live->tai_error, std::chrono::nanoseconds(1)) << "0 would read as not synchronised";
+}
+
+TEST(Encoder, LiveValuesAreHeldAtTheLargestThatFit) {
+  using std::chrono::nanoseconds;
+  Encoder encoder(kGoldenConfig);
+  Message message;
+  for (const int sign : {1, -1}) {
+    message.live.emplace();
+    message.live->pair_skew = message.live->send_error = message.live->tai_error = sign * std::chrono::hours(1);
+    const auto datagram = decode(encode(encoder, message)[0]);
+    ASSERT_TRUE(datagram && datagram->live);
+    EXPECT_EQ(datagram->live->pair_skew, sign * nanoseconds(2'147'483'647));
+    EXPECT_EQ(datagram->live->send_error, sign * nanoseconds(2'147'483'647));
+    EXPECT_EQ(datagram->live->tai_error, sign > 0 ? nanoseconds(4'294'967'295) : nanoseconds(1));
+  }
+}
+
+TEST(Encoder, EveryFieldOfAStatusComesBack) {
+  Encoder encoder(kGoldenConfig);
+  const CaptureTime now{std::chrono::nanoseconds{123'456'789}};
+  const auto datagram = decode(encode_status(encoder, golden_status(), golden_live(), now));
+  ASSERT_TRUE(datagram.has_value()) << to_string(datagram.error());
+  const Header& h = datagram->header;
+  EXPECT_EQ(h.rig, kGoldenConfig.rig);
+  EXPECT_EQ(h.session, kGoldenConfig.session);
+  EXPECT_EQ(h.sequence, 0U);
+  EXPECT_EQ(h.part, 1U);
+  EXPECT_EQ(h.parts, 1U);
+  EXPECT_EQ(h.ordinal, 0U);
+  EXPECT_EQ(h.capture_time_ns, 0);
+  EXPECT_EQ(h.send_time_ns, 123'456'789);
+  EXPECT_TRUE(datagram->targets.empty());
+  ASSERT_TRUE(datagram->live.has_value());
+  EXPECT_TRUE(*datagram->live == golden_live());
+  EXPECT_EQ(datagram->status_sequence, 1U);
+  ASSERT_TRUE(datagram->status.has_value());
+  EXPECT_TRUE(*datagram->status == golden_status());
+}
+
+TEST(Encoder, StatusesAndMessagesCountApart) {
+  Encoder encoder(kGoldenConfig);
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    const auto status = decode(encode_status(encoder, {}));
+    ASSERT_TRUE(status.has_value());
+    EXPECT_EQ(status->status_sequence, i);
+    EXPECT_FALSE(status->live.has_value());
+    const auto message = decode(encode(encoder, {})[0]);
+    ASSERT_TRUE(message.has_value());
+    EXPECT_EQ(message->header.sequence, i);
+    EXPECT_EQ(encoder.sequence(), i);
+    EXPECT_EQ(encoder.status_sequence(), i);
+  }
+}
+
 TEST(Encoder, FullestDatagramFitsIn1200Bytes) {
   // Every variable length at its largest: what the schema's computed bound is made of.
   auto list = tracks(32);
@@ -123,15 +221,32 @@ TEST(Encoder, FullestDatagramFitsIn1200Bytes) {
   Message message = golden_message(list);
   message.ordinal = std::numeric_limits<std::uint64_t>::max();
   message.flags = message.frames_skipped = message.tracks_dropped = 0xFFFF'FFFF;
-  Encoder encoder(kGoldenConfig);
+  message.live = golden_live();
+  message.live->exposure_left_us = message.live->exposure_right_us = message.live->health = 0xFFFF'FFFF;
+  message.live->efforts_shed = 0xFF;
+  const Signer signer(kGoldenKey);
+  Encoder encoder({.rig = 9, .session = 1, .signer = &signer});
   const auto datagrams = encode(encoder, message);
   ASSERT_EQ(datagrams.size(), 4U);
   for (const Bytes& bytes : datagrams) {
-    EXPECT_GT(bytes.size(), 1000U);
-    EXPECT_LE(bytes.size(), static_cast<std::size_t>(stereotrack_Datagram_size));
+    EXPECT_GT(bytes.size(), 1140U);
     EXPECT_LE(bytes.size(), kMaxDatagramBytes);
     EXPECT_TRUE(decode(bytes).has_value());
   }
+}
+
+TEST(Encoder, FullestStatusFitsIn1200Bytes) {
+  Status status;
+  std::memset(static_cast<void*>(&status), 0xFF, sizeof status);  // numbers only: each at its largest
+  const Signer signer(kGoldenKey);
+  Encoder encoder({.rig = 9, .session = 1, .signer = &signer});
+  const Bytes bytes = encode_status(encoder, status, golden_live());
+  EXPECT_GT(bytes.size(), 300U);
+  EXPECT_LE(bytes.size(), kMaxDatagramBytes);
+  const auto datagram = decode(bytes);
+  ASSERT_TRUE(datagram && datagram->status);
+  EXPECT_EQ(datagram->status->skew_max_us, 0xFFFF'FFFFU);
+  EXPECT_EQ(datagram->status->clock_steps, std::numeric_limits<std::uint64_t>::max());
 }
 
 TEST(Encoder, NoTargetIsOnePartWithoutTargets) {

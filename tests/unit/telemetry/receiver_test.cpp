@@ -70,6 +70,30 @@ TEST(Decode, StoredDatagramOfEverySchemaIsStillUnderstood) {
   EXPECT_EQ(datagram->targets[1].id, 300U);
 }
 
+TEST(Decode, StoredDatagramsOfALiveRigAreStillUnderstood) {
+  const auto stored = read_hex(STEREOTRACK_SOURCE_DIR "/tests/unit/telemetry/datagrams_live_v1.hex");
+  ASSERT_EQ(stored.size(), 3U);
+  for (const std::size_t i : {0U, 2U}) {
+    const auto message = decode(stored[i]);
+    ASSERT_TRUE(message.has_value()) << to_string(message.error());
+    EXPECT_EQ(message->header.flags,
+              kNoColour | kFramesSkippedBefore | kPairMissing | kPredicted | kEffortShed | kClockStepped);
+    EXPECT_EQ(message->targets.size(), 2U);
+    ASSERT_TRUE(message->live.has_value());
+    EXPECT_TRUE(*message->live == golden_live());
+  }
+  const auto status = decode(stored[1]);
+  ASSERT_TRUE(status && status->status && status->live);
+  EXPECT_TRUE(*status->status == golden_status());
+  EXPECT_TRUE(*status->live == golden_live_without_pair());
+
+  Receiver receiver({kGoldenKey});
+  EXPECT_EQ(receiver.accept(stored[0]), Outcome::kRefused);
+  EXPECT_EQ(receiver.refusal(), Refusal::kUnsigned);
+  EXPECT_EQ(receiver.accept(stored[2]), Outcome::kPair);
+  EXPECT_TRUE(receiver.pair().live == golden_live());
+}
+
 TEST(Decode, UnknownFieldsOfANewerSenderAreSkipped) {
   const Bytes known = stream(1, 2)[0][0];
   Bytes newer = known;
@@ -119,6 +143,20 @@ TEST(Decode, EachDefectHasItsReason) {
   EXPECT_EQ(refused([](auto& d) { d.part = d.parts = 5; }), Refusal::kInconsistent);
   EXPECT_EQ(refused([](auto& d) { d.sequence = 0; }), Refusal::kInconsistent);
   EXPECT_EQ(refused([](auto& d) { d.targets[0].box_count = 3; }), Refusal::kInconsistent);
+  const auto status_refused = [](auto spoil) {
+    stereotrack_Datagram datagram = valid();
+    datagram.sequence = 0;
+    datagram.targets_count = 0;
+    datagram.has_status = true;
+    datagram.status.sequence = 1;
+    EXPECT_TRUE(decode(wire(datagram)).has_value());
+    spoil(datagram);
+    return refusal_of(wire(datagram));
+  };
+  EXPECT_EQ(status_refused([](auto& d) { d.sequence = 1; }), Refusal::kInconsistent);
+  EXPECT_EQ(status_refused([](auto& d) { d.status.sequence = 0; }), Refusal::kInconsistent);
+  EXPECT_EQ(status_refused([](auto& d) { d.parts = 2; }), Refusal::kInconsistent);
+  EXPECT_EQ(status_refused([](auto& d) { d.targets_count = 1; }), Refusal::kInconsistent);
   EXPECT_EQ(refused([](auto& d) { d.targets[0].position_count = 2; }), Refusal::kInconsistent);
   EXPECT_EQ(refused([](auto& d) { d.targets[0].velocity_count = 3; }), Refusal::kInconsistent);
   EXPECT_EQ(refused([](auto& d) { d.targets[0].extent_count = 2; }), Refusal::kInconsistent);
@@ -128,7 +166,10 @@ TEST(Decode, EachDefectHasItsReason) {
 }
 
 TEST(Decode, MutatedDatagramsNeverCrashAndNeverGiveANonFiniteNumber) {
-  const auto seeds = stream(1, 32)[0];
+  auto seeds = stream(1, 32)[0];
+  for (Bytes& bytes : read_hex(STEREOTRACK_SOURCE_DIR "/tests/unit/telemetry/datagrams_live_v1.hex")) {
+    seeds.push_back(std::move(bytes));
+  }
   std::mt19937 random(99);
   std::size_t taken = 0;
   std::size_t refused = 0;
@@ -278,6 +319,19 @@ TEST(Receiver, ASenderThatBeginsAgainUnderTheSameSessionIsARestart) {
   EXPECT_EQ(receiver.counters().restarts, 1U);
   EXPECT_EQ(receiver.counters().pairs, 40U);
   EXPECT_EQ(receiver.lost(), 0U);
+}
+
+TEST(Receiver, StatusesBetweenPairsLoseNothing) {
+  Receiver receiver;
+  Encoder encoder(kGoldenConfig);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(receiver.accept(encode(encoder, {})[0]), Outcome::kPair);
+    EXPECT_EQ(receiver.accept(encode_status(encoder, golden_status())), Outcome::kStatus);
+    EXPECT_EQ(receiver.datagram().status_sequence, static_cast<std::uint64_t>(i + 1));
+  }
+  EXPECT_EQ(receiver.lost(), 0U);
+  EXPECT_EQ(receiver.counters().pairs, 5U);
+  EXPECT_EQ(receiver.counters().statuses, 5U);
 }
 
 TEST(Receiver, PartsThatDisagreeOnTheirNumberAreRefused) {

@@ -1,0 +1,54 @@
+#include "drivers/telemetry/durable_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include "drivers/telemetry/endpoint.hpp"
+
+namespace stereotrack::telemetry {
+namespace {
+
+/// False with errno.
+bool write_all(int fd, std::string_view content) noexcept {
+  while (!content.empty()) {
+    const ssize_t written = ::write(fd, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return ::fsync(fd) == 0;
+}
+
+}  // namespace
+
+void write_durably(const std::filesystem::path& path, std::string_view content) {
+  const auto fail = [&] {
+    throw std::system_error(errno, std::generic_category(), path.string() + ": cannot be written");
+  };
+  const std::filesystem::path part = path.string() + ".new";
+  {
+    const Socket file(::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR));
+    if (file.fd() < 0) fail();
+    if (!write_all(file.fd(), content)) {
+      const int error = errno;
+      ::unlink(part.c_str());
+      errno = error;
+      fail();
+    }
+  }
+  if (::rename(part.c_str(), path.c_str()) != 0) {
+    const int error = errno;
+    ::unlink(part.c_str());
+    errno = error;
+    fail();
+  }
+  // A file that was renamed is found after a power cut only once its folder is on the disk, too.
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  const Socket directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (directory.fd() < 0 || ::fsync(directory.fd()) != 0) fail();
+}
+
+}  // namespace stereotrack::telemetry
