@@ -88,7 +88,7 @@ class Replay {
         interrupts_(interrupts),
         messages_(messages),
         rig_(open_rig(arguments.rig)),
-        pipeline_(make_pipeline(rig_, arena_, times_.observer())),
+        pipeline_(make_pipeline(rig_, rig_.source->info(), arena_, times_.observer())),
         encoder_({.rig = rig_.configuration().telemetry.rig_id, .session = kReplaySession}) {
     arena_.seal();
     if (arguments.out) {
@@ -274,22 +274,12 @@ int check_replay(const ReplayArguments& arguments, std::ostream& out) {
   const Rig rig = open_rig(arguments.rig);
   (void)destinations_of(rig.configuration());
   Arena arena;
-  const Pipeline pipeline = make_pipeline(rig, arena);
+  const Pipeline pipeline = make_pipeline(rig, rig.source->info(), arena);
   const capture::SourceInfo& info = rig.source->info();
   out << info.name << ": " << info.width << 'x' << info.height << ' '
       << (info.format == PixelFormat::kGrey8 ? "grey" : "colour") << ' ' << (info.stereo ? "stereo" : "mono")
       << ", preset " << rig.configuration().preset << ": configuration, calibration and source are fine\n";
-  const auto row = [&out](const char* name, const std::string& bytes) {
-    char line[64];
-    (void)std::snprintf(line, sizeof line, "%-10s %12s\n", name, bytes.c_str());
-    out << line;
-  };
-  row("memory", "bytes");
-  for (std::size_t i = 0; i < kMemoryParts; ++i) {
-    const auto part = static_cast<MemoryPart>(i);
-    row(to_string(part), std::to_string(pipeline.memory().bytes(part)));
-  }
-  row("total", std::to_string(pipeline.memory().total()));
+  print_memory(out, pipeline.memory());
   out << "the arena took " << arena.capacity() << " bytes from the system and takes no more\n";
   return 0;
 }
@@ -297,7 +287,7 @@ int check_replay(const ReplayArguments& arguments, std::ostream& out) {
 int run_masks(const MasksArguments& arguments, std::ostream& messages) {
   const Rig rig = open_rig(arguments.rig);
   Arena arena;
-  Pipeline pipeline = make_pipeline(rig, arena);
+  Pipeline pipeline = make_pipeline(rig, rig.source->info(), arena);
   make_output_folder(arguments.out);
   const Interrupts interrupts;
   const capture::SourceInfo& info = rig.source->info();

@@ -5,19 +5,13 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "config/calibration/check.hpp"
-#include "config/calibration/read_calibration.hpp"
-#include "config/rules.hpp"
 #include "drivers/capture/replay/replay.hpp"
-#include "drivers/capture/synthetic/synthetic_source.hpp"
 
 namespace stereotrack {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-constexpr std::string_view kSynthetic = "synthetic:";
 
 std::uint64_t parse_ordinal(std::string_view text, const std::string& whole, std::uint64_t absent) {
   if (text.empty()) return absent;
@@ -63,13 +57,6 @@ FrameRange parse_frames(const std::string& text) {
   return range;
 }
 
-config::Loaded load_configuration(const std::optional<std::string>& file, const std::vector<std::string>& set) {
-  std::vector<config::Layer> layers;
-  if (file) layers.push_back(config::file_layer(*file));
-  for (const std::string& entry : set) layers.push_back(config::override_layer(entry));
-  return config::load(layers);
-}
-
 Rig open_rig(const RigArguments& arguments) {
   Rig rig;
   const bool synthetic = arguments.source.starts_with(kSynthetic);
@@ -80,22 +67,7 @@ Rig open_rig(const RigArguments& arguments) {
   const config::Configuration& configuration = rig.configuration();
 
   if (synthetic) {
-    capture::SyntheticOptions options;
-    options.fps = configuration.source.fps;
-    options.seed = configuration.synthetic.seed;
-    options.frames = static_cast<std::uint64_t>(configuration.synthetic.frames);
-    options.width = configuration.synthetic.width;
-    options.height = configuration.synthetic.height;
-    std::unique_ptr<capture::SyntheticSource> scene;
-    try {
-      scene = capture::open_synthetic(arguments.source.substr(kSynthetic.size()), options);
-    } catch (const capture::SceneError& error) {
-      throw config::Error(error.what());
-    }
-    rig.calibration = scene->calibration();
-    rig.calibration_name = arguments.source;
-    rig.unit_m = 1;
-    rig.source = std::move(scene);
+    open_scene(arguments.source, rig);
   } else {
     rig.source = capture::open_replay(arguments.source, {.fps = configuration.source.fps,
                                                          .flip = configuration.source.flip,
@@ -108,38 +80,16 @@ Rig open_rig(const RigArguments& arguments) {
       throw config::Error("--calibration " + *arguments.calibration + ": " + arguments.source +
                           " is a mono source, which takes none; leave the option out");
     }
-    rig.calibration_name = arguments.calibration.value_or(folder.string());
-    calibration::CalibrationFile read;
     try {
-      read = calibration::read_calibration_file(rig.calibration_name, {.kitti_colour = is_kitti_colour(folder)});
+      read_calibration(arguments.calibration.value_or(folder.string()), {.kitti_colour = is_kitti_colour(folder)}, rig);
     } catch (const std::runtime_error& error) {
       if (arguments.calibration) throw;
       throw std::runtime_error(std::string(error.what()) +
                                " (a stereo source needs a calibration: give --calibration FILE, or use mono:PATH)");
     }
-    rig.calibration = read.stereo;
-    rig.unit_m = calibration::unit_m(read.format).value_or(0);
   }
-  if (configuration.calibration.unit_m > 0) rig.unit_m = configuration.calibration.unit_m;
-  config::check_metres(rig.loaded, rig.unit_m);
-  if (rig.calibration) calibration::check_size(*rig.calibration, info.width, info.height, rig.calibration_name);
+  check_rig(rig);
   return rig;
-}
-
-Pipeline make_pipeline(const Rig& rig, Arena& arena, const StageObserver& observer) {
-  const capture::SourceInfo& info = rig.source->info();
-  Pipeline::Setup setup;
-  setup.width = info.width;
-  setup.height = info.height;
-  setup.colour = has_colour(info.format);
-  setup.calibration = info.stereo ? &*rig.calibration : nullptr;
-  setup.observer = observer;
-  const Result<Pipeline> pipeline = Pipeline::create(rig.configuration().pipeline, setup, arena);
-  if (!pipeline.has_value()) {
-    throw std::runtime_error(info.name + ": no pipeline for pictures of " + std::to_string(info.width) + "x" +
-                             std::to_string(info.height) + ": " + to_string(pipeline.error()));
-  }
-  return *pipeline;
 }
 
 }  // namespace stereotrack

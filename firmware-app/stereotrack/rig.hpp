@@ -1,15 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "config/load.hpp"
-#include "drivers/capture/frame_source.hpp"
-#include "pipeline/core/arena.hpp"
-#include "pipeline/pipeline.hpp"
+#include "firmware-app/rig/rig.hpp"
 
 namespace stereotrack {
 
@@ -30,25 +26,7 @@ struct FrameRange {
 /// A:B, A:, :B, or N. Throws config::Error.
 [[nodiscard]] FrameRange parse_frames(const std::string& text);
 
-/// Configuration alone: preset, file, --set. Throws config::Error.
-[[nodiscard]] config::Loaded load_configuration(const std::optional<std::string>& file,
-                                                const std::vector<std::string>& set);
-
-/// A source, its calibration and configuration, opened and checked against each other.
-struct Rig {
-  config::Loaded loaded;
-  std::unique_ptr<capture::FrameSource> source;
-  std::optional<StereoCalibration> calibration;  ///< none for mono
-  std::string calibration_name;                  ///< for messages
-  double unit_m = 0;                             ///< metres in one unit of the calibration, 0 = not known
-
-  [[nodiscard]] const config::Configuration& configuration() const noexcept { return loaded.configuration; }
-};
-
-/// Throws config::Error (exit 2) or std::runtime_error (exit 1), one line each.
+/// What they name, opened and checked. Throws config::Error (exit 2) or std::runtime_error (exit 1), one line each.
 [[nodiscard]] Rig open_rig(const RigArguments& arguments);
-
-/// The pipeline for a rig. Throws std::runtime_error with the stage's fault in words.
-[[nodiscard]] Pipeline make_pipeline(const Rig& rig, Arena& arena, const StageObserver& observer = {});
 
 }  // namespace stereotrack

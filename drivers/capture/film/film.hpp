@@ -10,14 +10,14 @@
 
 namespace stereotrack::capture {
 
-/// A recording or a scene as if cameras saw it now. All of it is in memory, so that the capture thread waits for no disk
-/// and draws nothing; it is exposed pair by pair at the intervals of its own capture times, on the monotonic clock, which
-/// is its capture clock. A pair is put in the moment it is exposed.
+/// A recording or a scene as if cameras saw it now. All of it is in memory, so that the capture thread waits for no
+/// disk and draws nothing; it is exposed pair by pair at the intervals of its own capture times, on the monotonic
+/// clock, which is its capture clock. A pair is put in the moment it is exposed.
 ///
 ///     pair i of n:   t_i = t_start + (capture_i - capture_1),  a period between the last and the next first
 ///
-/// Pairs that the source could not read leave a gap: their ordinal is counted and no pair comes. Ordinals and times rise
-/// for ever, whichever way it is played.
+/// Pairs that the source could not read leave a gap: their ordinal is counted and no pair comes. Ordinals and times
+/// rise for ever, whichever way it is played.
 class Film final : public LiveSource {
  public:
   enum class Repeat : std::uint8_t { kBounce, kLoop, kOnce };

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <iosfwd>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/calibration/read_calibration.hpp"
+#include "config/load.hpp"
+#include "drivers/capture/frame_source.hpp"
+#include "pipeline/core/arena.hpp"
+#include "pipeline/pipeline.hpp"
+
+namespace stereotrack {
+
+/// What starts the name of a scene that is drawn: synthetic:NAME.
+inline constexpr std::string_view kSynthetic = "synthetic:";
+
+/// A source, its calibration and configuration, opened and checked against each other: what every program begins with.
+/// The functions fill it in this order: load_configuration(), then open_scene() or a source of the program's own and
+/// read_calibration(), then check_rig(). All throw config::Error (exit 2) or std::runtime_error (exit 1), one line.
+struct Rig {
+  config::Loaded loaded;
+  std::unique_ptr<capture::FrameSource> source;
+  std::optional<StereoCalibration> calibration;  ///< none for mono
+  std::string calibration_name;                  ///< for messages
+  double unit_m = 0;                             ///< metres in one unit of the calibration, 0 = not known
+
+  [[nodiscard]] const config::Configuration& configuration() const noexcept { return loaded.configuration; }
+};
+
+/// Preset, file, then --set entries.
+[[nodiscard]] config::Loaded load_configuration(const std::optional<std::string>& file,
+                                                const std::vector<std::string>& set);
+
+/// Draws synthetic:NAME, which brings its calibration, as [synthetic] and source.fps say.
+void open_scene(const std::string& name, Rig& rig);
+
+/// The calibration of a stereo source.
+void read_calibration(const std::string& path, const calibration::ReadOptions& options, Rig& rig);
+
+/// calibration.unit_m, keys in metres, and the size of the pictures.
+void check_rig(Rig& rig);
+
+/// The pipeline for what the source delivers. Throws std::runtime_error with the stage's fault in words.
+[[nodiscard]] Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena,
+                                     const StageObserver& observer = {});
+
+/// What a pipeline took, by part, as a table for people.
+void print_memory(std::ostream& out, const MemoryUse& memory);
+
+}  // namespace stereotrack
