@@ -41,8 +41,8 @@ struct LineSpec {
 };
 
 /// Outputs of one chip that were requested together, in the shape of libgpiod 2: what changes together leaves in one
-/// system call, and one line's old value cannot be seen beside another's new one. The seam: simulated_chip.hpp,
-/// gpiod.hpp. One thread. Letting go is the destructor's business.
+/// system call. Levels, not states: polarity is OutputLines' business, since libgpiod 1 knows but one for all lines of
+/// a request. The seam: simulated_chip.hpp, gpiod.hpp. One thread. The destructor lets the lines go as they are.
 class LineRequest {
  public:
   LineRequest() = default;
@@ -50,10 +50,16 @@ class LineRequest {
   LineRequest& operator=(const LineRequest&) = delete;
   virtual ~LineRequest() = default;
 
-  /// Drives all lines of the request; bit k is its line k. False: refused, error() says why (the chip is gone).
-  /// No heap, no lock, one system call (none if simulated).
-  [[nodiscard]] virtual bool set(LineBits active) noexcept = 0;
-  [[nodiscard]] virtual int error() const noexcept = 0;  ///< errno of the last set() that was refused; 0: none was
+  /// Drives all lines of the request; bit k is its line k, 1 = high. 0: done, else why not, an errno (ENODEV: the chip
+  /// is gone). No heap, no lock, at most one system call.
+  [[nodiscard]] virtual int set(LineBits high) noexcept = 0;
+};
+
+/// One line of a request: where it is on its chip, and the level that it shows from the first moment on.
+struct WantedLine {
+  LineName name;
+  unsigned offset = 0;  ///< its number on the chip; of no meaning to the simulated chip
+  bool high = false;
 };
 
 /// All outputs of the program, whatever their chips. Made by open_lines(); moves, but not while it is used.

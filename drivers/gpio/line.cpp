@@ -1,0 +1,191 @@
+#include "drivers/gpio/line.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <stdexcept>
+#include <utility>
+
+#include "drivers/gpio/gpiod.hpp"
+#include "drivers/gpio/simulated_chip.hpp"
+
+namespace stereotrack::gpio {
+namespace {
+
+/// What the metrics read while the lines are driven.
+struct Meter {
+  std::atomic<bool> active{false};
+  std::atomic<std::uint64_t> transitions{0};
+  std::atomic<std::int64_t> changed_ns{0};
+  std::atomic<std::uint64_t> failures{0};
+};
+
+/// A chip's lines among all of the program.
+struct ChipLines {
+  std::string path;                       ///< of the chip, or "sim"
+  std::vector<WantedLine> wanted;         ///< until it is requested
+  std::array<unsigned, kMaxLines> all{};  ///< line k of this chip is line all[k] of the program
+  std::size_t count = 0;
+  LineBits mine = 0;  ///< the same, as bits
+  std::unique_ptr<LineRequest> request;
+  bool failed = false;  ///< refused last time: what its lines show is not known
+};
+
+[[noreturn]] void refuse(const LineName& name, const std::string& what) {
+  throw std::runtime_error("GPIO line " + to_string(name) + ": " + what);
+}
+
+}  // namespace
+
+struct OutputLines::State {
+  std::vector<ChipLines> chips;
+  std::vector<LineName> names;
+  LineBits low = 0;   ///< lines that are active_low
+  LineBits safe = 0;  ///< lines whose safe state is active
+  LineBits told = 0;  ///< active lines, as far as their chips took it
+  std::array<Meter, kMaxLines> meters;
+  std::atomic<int> last_error{0};
+
+  SetResult set(LineBits active, MonotonicTime now) noexcept {
+    SetResult result;
+    for (ChipLines& chip : chips) {
+      const LineBits differ = (active ^ told) & chip.mine;
+      if (differ == 0 && !chip.failed) continue;
+      const int error = chip.request->set(levels(chip, active));
+      chip.failed = error != 0;
+      if (chip.failed) {
+        last_error.store(error, std::memory_order_relaxed);
+        result.failed |= chip.mine;
+        continue;
+      }
+      told ^= differ;
+      result.changed |= differ;
+    }
+    for (unsigned i = 0; i < names.size(); ++i) note(i, result, now);
+    return result;
+  }
+
+  /// Line k of the chip is bit k.
+  [[nodiscard]] LineBits levels(const ChipLines& chip, LineBits active) const noexcept {
+    const LineBits high = active ^ low;
+    LineBits bits = 0;
+    for (std::size_t k = 0; k < chip.count; ++k) bits |= (high >> chip.all[k] & 1U) << k;
+    return bits;
+  }
+
+  void note(unsigned line, const SetResult& result, MonotonicTime now) noexcept {
+    Meter& meter = meters[line];
+    if ((result.failed >> line & 1U) != 0) meter.failures.fetch_add(1, std::memory_order_relaxed);
+    if ((result.changed >> line & 1U) == 0) return;
+    meter.active.store((told >> line & 1U) != 0, std::memory_order_relaxed);
+    meter.transitions.fetch_add(1, std::memory_order_relaxed);
+    meter.changed_ns.store(now.time_since_epoch().count(), std::memory_order_relaxed);
+  }
+};
+
+OutputLines::OutputLines() : state_(std::make_unique<State>()) {}
+OutputLines::OutputLines(OutputLines&&) noexcept = default;
+OutputLines& OutputLines::operator=(OutputLines&& other) noexcept {
+  std::swap(state_, other.state_);
+  return *this;
+}
+
+OutputLines::~OutputLines() {
+  // Not requested chips, of an open_lines() that failed, were told nothing: they are left alone.
+  if (state_ != nullptr) state_->set(state_->safe, {});
+}
+
+OutputLines::SetResult OutputLines::set(LineBits active, MonotonicTime now) noexcept {
+  return state_->set(active, now);
+}
+
+OutputLines::SetResult OutputLines::set_safe(MonotonicTime now) noexcept { return state_->set(state_->safe, now); }
+
+std::size_t OutputLines::size() const noexcept { return state_->names.size(); }
+
+const LineName& OutputLines::name(std::size_t line) const noexcept { return state_->names[line]; }
+
+OutputLines::Reading OutputLines::read(std::size_t line) const noexcept {
+  const Meter& meter = state_->meters[line];
+  return {.active = meter.active.load(std::memory_order_relaxed),
+          .transitions = meter.transitions.load(std::memory_order_relaxed),
+          .changed = MonotonicTime(std::chrono::nanoseconds(meter.changed_ns.load(std::memory_order_relaxed))),
+          .failures = meter.failures.load(std::memory_order_relaxed)};
+}
+
+int OutputLines::last_error() const noexcept { return state_->last_error.load(std::memory_order_relaxed); }
+
+OutputLines open_lines(std::span<const LineSpec> specs, std::string_view consumer) {
+  if (specs.size() > kMaxLines) {
+    refuse(specs[kMaxLines].name, "one too many: a program drives " + std::to_string(kMaxLines) + " lines");
+  }
+  OutputLines lines;
+  OutputLines::State& state = *lines.state_;
+  for (const LineSpec& spec : specs) {
+    const bool simulated = spec.name.chip == simulated_chip::kChip;
+    const gpiod::Found found = simulated ? gpiod::Found{spec.name.chip, 0} : gpiod::find(spec.name);
+    auto chip = std::find_if(state.chips.begin(), state.chips.end(),
+                             [&](const ChipLines& known) { return known.path == found.path; });
+    if (chip == state.chips.end()) {
+      chip = state.chips.emplace(state.chips.end());
+      chip->path = found.path;
+    }
+    const WantedLine wanted{spec.name, found.offset, spec.safe != spec.active_low};
+    for (const WantedLine& other : chip->wanted) {
+      if (simulated ? other.name == wanted.name : other.offset == wanted.offset) {
+        refuse(spec.name,
+               "named twice" +
+                   (other.name == spec.name ? std::string() : ", the other time as " + to_string(other.name)) +
+                   ": a line has one rule");
+      }
+    }
+    const auto number = static_cast<unsigned>(state.names.size());
+    state.names.push_back(spec.name);
+    chip->wanted.push_back(wanted);
+    chip->all[chip->count++] = number;
+    chip->mine |= LineBits{1} << number;
+    if (spec.active_low) state.low |= LineBits{1} << number;
+    if (spec.safe) state.safe |= LineBits{1} << number;
+    state.meters[number].active.store(spec.safe, std::memory_order_relaxed);
+  }
+  state.told = state.safe;
+  for (ChipLines& chip : state.chips) {
+    chip.request = chip.path == simulated_chip::kChip ? simulated_chip::request(chip.wanted, consumer)
+                                                      : gpiod::request(chip.path, chip.wanted, consumer);
+  }
+  return lines;
+}
+
+std::vector<SafeOutcome> set_lines_safe(std::span<const LineSpec> specs, std::string_view consumer) {
+  std::vector<SafeOutcome> outcomes;
+  for (const LineSpec& spec : specs) {
+    try {
+      static_cast<void>(open_lines({&spec, 1}, consumer));
+      outcomes.push_back({true, "GPIO line " + to_string(spec.name) + ": driven " +
+                                    (spec.safe ? "active" : "inactive") + ", its safe state (" +
+                                    (spec.safe != spec.active_low ? "high" : "low") + "), and let go"});
+    } catch (const std::runtime_error& error) {
+      outcomes.push_back({false, error.what()});
+    }
+  }
+  return outcomes;
+}
+
+LineName parse_line_name(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  LineName name;
+  if (colon != std::string_view::npos) {
+    name = {std::string(text.substr(0, colon)), std::string(text.substr(colon + 1))};
+  }
+  const bool blank = text.find_first_of(" \t\r\n") == 0 || text.find_last_of(" \t\r\n") + 1 == text.size();
+  if (name.chip.empty() || name.line.empty() || (blank && !text.empty())) {
+    throw std::runtime_error("\"" + std::string(text) +
+                             "\" is no GPIO line: write CHIP:LINE, for example gpiochip0:17, pinctrl-bcm2711:GPIO17 or "
+                             "sim:near");
+  }
+  return name;
+}
+
+std::string to_string(const LineName& name) { return name.chip + ":" + name.line; }
+
+}  // namespace stereotrack::gpio
