@@ -98,7 +98,8 @@ class SignalRules {
   /// that is not > 0, a pulsed heartbeat, hold < 0), kNotFinite.
   [[nodiscard]] static Result<SignalRules> create(const Config& config) noexcept;
 
-  /// The lines at an output. `now` does not fall from call to call.
+  /// The lines at an output. A time before that of the last call is taken
+  /// for that of the last call.
   [[nodiscard]] gpio::LineBits decide(const Inputs& inputs, MonotonicTime now) noexcept;
 
   /// The lines between outputs: ends what ends, lets the heart beat, ages what nobody renews.
@@ -116,22 +117,30 @@ class SignalRules {
   struct Course {
     bool known = false;
     bool holds = false;          ///< the condition, at the last decide()
+    bool active = false;         ///< pulse or heartbeat
     MonotonicTime held_until{};  ///< end of the hold
-    MonotonicTime next{};        ///< kPulse: its end; kHeartbeat: its next edge
-    bool high = false;           ///< kPulse: runs; kHeartbeat: in its active half
+    MonotonicTime next{};        ///< end of the pulse, next edge of the heartbeat
+
+    void follow(const Signal& signal, bool condition, MonotonicTime now) noexcept;
+    void pass(const Signal& signal, MonotonicTime now) noexcept;
+    [[nodiscard]] bool is_held(MonotonicTime now) const noexcept;
+    [[nodiscard]] bool is_timed(const Signal& signal) const noexcept;
   };
 
   explicit SignalRules(const Config& config) noexcept;
 
+  [[nodiscard]] bool needs_depth(const Signal& signal) const noexcept;
   [[nodiscard]] bool is_known(const Signal& signal, const Inputs& inputs) const noexcept;
   [[nodiscard]] bool fulfils(const Signal& signal, const TrackReport& target) const noexcept;
   [[nodiscard]] bool holds(const Signal& signal, const Inputs& inputs) const noexcept;
+  [[nodiscard]] gpio::LineBits compose() noexcept;
 
   Config config_;
   gpio::LineBits safe_ = 0;
   gpio::LineBits lines_ = 0;
-  bool fresh_ = false;  ///< a decide() came, less than stale_after ago
-  MonotonicTime decided_{};
+  bool fresh_ = false;       ///< a decide() came, less than stale_after ago
+  MonotonicTime decided_{};  ///< when
+  MonotonicTime now_{MonotonicTime::duration::min()};
   std::array<Course, kMaxSignals> courses_{};
 };
 

@@ -21,7 +21,7 @@ struct Zone {
   /// Which point of a target has to lie in the polygon.
   enum class Anchor : std::uint8_t {
     kCentre,  ///< (image_x, image_y)
-    kBottom,  ///< under the centre, at the foot of its box: where what stands on the ground touches it
+    kBottom,  ///< (image_x, last row of the box): where what stands on the ground touches it
   };
   struct Range {
     double from = 0;
