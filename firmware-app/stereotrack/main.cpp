@@ -5,7 +5,9 @@
 #include <iostream>
 
 #include "config/error.hpp"
+#include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/endpoint.hpp"
+#include "drivers/telemetry/replay_guard.hpp"
 #include "firmware-app/stereotrack/disparity.hpp"
 #include "firmware-app/stereotrack/eval.hpp"
 #include "firmware-app/stereotrack/monitor.hpp"
@@ -95,6 +97,10 @@ int run(int argc, char** argv) {
   monitor_command->add_flag("--json", monitor.json, "one JSON object a datagram");
   monitor_command->add_option("--count", monitor.count, "end after so many pairs");
   monitor_command->add_option("--timeout", monitor.timeout_s, "fail if nothing comes for so many seconds");
+  CLI::Option* key_file =
+      monitor_command->add_option("--key-file", monitor.key_file, "take only what is signed with its keys");
+  monitor_command->add_option("--state", monitor.state, "file that keeps what was seen: no replays after a restart")
+      ->needs(key_file);
 
   try {
     app.parse(argc, argv);
@@ -133,6 +139,12 @@ int main(int argc, char** argv) {
     std::cerr << "stereotrack: " << error.what() << '\n';
     return kBadUsage;
   } catch (const stereotrack::telemetry::EndpointError& error) {
+    std::cerr << "stereotrack: " << error.what() << '\n';
+    return kBadUsage;
+  } catch (const stereotrack::telemetry::KeyFileError& error) {
+    std::cerr << "stereotrack: " << error.what() << '\n';
+    return kBadUsage;
+  } catch (const stereotrack::telemetry::MarksFileError& error) {
     std::cerr << "stereotrack: " << error.what() << '\n';
     return kBadUsage;
   } catch (const std::exception& error) {

@@ -9,11 +9,16 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
+#include <span>
 #include <sstream>
 #include <thread>
 
+#include "drivers/telemetry/authentication.hpp"
+#include "drivers/telemetry/replay_guard.hpp"
 #include "drivers/telemetry/udp_listener.hpp"
 #include "drivers/telemetry/udp_sender.hpp"
+#include "tests/support/temp_dir.hpp"
 #include "tests/unit/telemetry/messages.hpp"
 
 namespace stereotrack {
@@ -122,6 +127,143 @@ TEST(Monitor, CtrlCEndsWithTheSummaryAndExitCode0) {
   EXPECT_EQ(run.exit_code, 0);
   EXPECT_THAT(run.out, HasSubstr("received "));
   EXPECT_THAT(run.out, HasSubstr(", refused 0, duplicates 0"));
+}
+
+/// `count` messages of a live rig and a status after each, signed.
+std::vector<Bytes> live_stream(int count, std::uint64_t session = 7, telemetry::Key key = telemetry::kGoldenKey) {
+  const telemetry::Signer signer(key);
+  telemetry::Encoder encoder({.rig = 9, .session = session, .signer = &signer});
+  const auto list = telemetry::tracks(1);
+  std::vector<Bytes> all;
+  for (int i = 0; i < count; ++i) {
+    all.push_back(telemetry::encode(encoder, telemetry::golden_live_message(list))[0]);
+    all.push_back(telemetry::encode_status(encoder, telemetry::golden_status(), telemetry::golden_live_without_pair()));
+  }
+  return all;
+}
+
+TEST(Monitor, WhatALiveRigAddsIsShown) {
+  const Outcome run = run_with({.count = 3}, live_stream(2000));
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(
+      run.out,
+      HasSubstr("flags no-colour,skipped-before,pair-missing,predicted,effort-shed,clock-stepped  skew -12.0 us  "
+                "exposures 8.0 8.1 ms  send error +35.0 us  TAI +-1.5 us  shed corners,dense_map  "
+                "health skew,effort-shed  | 1 confirmed"));
+  EXPECT_THAT(run.out, HasSubstr("up 1d 00:00:00  pairs captured 2592000 evicted 11 skipped 12 starved 13  "
+                                 "outputs on time 5000000000 predicted 16 missing 17 overslept 18  "
+                                 "health deadlines-missed,not-real-time  compute 9.0 11.0 19.0 ms  "
+                                 "send error 6 30 120 us (p50 p99 max)  allocations 21  buffers free at least 5 of 8  "
+                                 "shed level_set  dropped telemetry 47 recording 25 lines 26\n"));
+  EXPECT_THAT(run.out, testing::ContainsRegex("received 3 pairs and [23] statuses in [56] datagrams, lost 0"));
+  EXPECT_THAT(run.messages, HasSubstr("signed with key 3, which is not checked: give --key-file\n"));
+}
+
+TEST(Monitor, JsonOfALiveRigHasTheNamesOfTheSchema) {
+  const Outcome run = run_with({.json = true, .count = 3}, live_stream(2000));
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(run.out, HasSubstr(",\"flags\":978,"));
+  EXPECT_THAT(run.out,
+              HasSubstr(",\"unit_m\":0.5,\"live\":{\"tai_offset_ns\":1700000037000000001,\"tai_error_ns\":1500,"
+                        "\"pair_skew_ns\":-12000,\"exposure_left_us\":8000,\"exposure_right_us\":8100,"
+                        "\"send_error_ns\":35000,\"efforts_shed\":10,\"health\":136},\"targets\":["));
+  EXPECT_THAT(run.out,
+              HasSubstr("{\"schema\":1,\"rig\":9,\"session\":7,\"send_time_ns\":0,"
+                        "\"live\":{\"tai_offset_ns\":1700000037000000001,\"tai_error_ns\":1500,"
+                        "\"send_error_ns\":35000,\"efforts_shed\":10,\"health\":136},\"status\":{\"sequence\":"));
+  EXPECT_THAT(run.out, HasSubstr(",\"uptime_ms\":86400000,\"health\":2112,\"efforts_shed\":1,\"latency_us\":50000,"));
+  EXPECT_THAT(run.out, HasSubstr(",\"send_error_max_us\":120,\"skew_max_us\":40}}\n"));
+}
+
+TEST(Monitor, LiveTableShowsHealthAndStatus) {
+  const Outcome run = run_with({.live = true, .count = 100}, live_stream(2000));
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(run.out, HasSubstr("  skew -12.0 us  exposures 8.0 8.1 ms  send error +35.0 us"));
+  EXPECT_THAT(run.out, HasSubstr("  up 1d 00:00:00  pairs captured 2592000"));
+  EXPECT_EQ(run.out.find("not checked"), std::string::npos);
+}
+
+TEST(Monitor, StatusesAloneAreASignOfLifeAndNoPairs) {
+  std::vector<Bytes> statuses;
+  const auto all = live_stream(2000);
+  for (std::size_t i = 1; i < all.size(); i += 2) statuses.push_back(all[i]);
+  const Outcome run = run_with({.count = 1, .timeout_s = 0.15}, statuses, 500);
+  EXPECT_EQ(run.exit_code, 0) << "ended by the signal, not by the time-out";
+  EXPECT_THAT(run.out, HasSubstr("received 0 pairs and "));
+}
+
+class KeyedMonitor : public testing::Test {
+ protected:
+  static std::string write_key(const test::TempDir& folder, const char* name, const telemetry::Key& key) {
+    const auto file = folder.write(
+        name, std::to_string(key.id) + ' ' + telemetry::to_hex(std::as_bytes(std::span(key.secret))) + '\n');
+    std::filesystem::permissions(file, std::filesystem::perms::owner_read);
+    return file.string();
+  }
+  test::TempDir folder_;
+  std::string key_file_ = write_key(folder_, "key", telemetry::kGoldenKey);
+};
+
+TEST_F(KeyedMonitor, EachForgedAlteredCutOrReplayedDatagramIsRefusedAndCountedByItsCause) {
+  const auto good = live_stream(3);
+  Bytes altered = live_stream(4)[6];
+  altered[30] ^= std::byte{1};
+  Bytes cut = live_stream(4)[6];
+  cut.resize(cut.size() - 10);
+  const Bytes other_key = live_stream(1, 7, {.id = 4, .secret = telemetry::kGoldenKey.secret})[0];
+  const Bytes forged = live_stream(4, 7, {.id = 3, .secret = {}})[6];
+  telemetry::Encoder plain({.rig = 9, .session = 8});
+  const Bytes without = telemetry::encode(plain, {})[0];
+  const Bytes old = live_stream(1, 6)[0];
+  std::vector<Bytes> all = good;
+  all.insert(all.end(), {altered, cut, other_key, forged, without, old});
+  // Whichever of them comes first: session 7 has been there.
+  const std::string state = (folder_ / "state").string();
+  telemetry::save_marks(state, std::vector<telemetry::Mark>{{.rig = 9, .session = 7}});
+  const Outcome run = run_with({.timeout_s = 0.4, .key_file = key_file_, .state = state}, all);
+  EXPECT_EQ(run.exit_code, 1) << "refused ones are no sign of life";
+  EXPECT_THAT(run.out, HasSubstr("received 3 pairs and 3 statuses in "));
+  EXPECT_THAT(run.out,
+              testing::ContainsRegex("refused [0-9]+ \\([0-9]+ truncated, [0-9]+ unsigned, [0-9]+ unknown key, "
+                                     "[0-9]+ forged, [0-9]+ replayed, [0-9]+ old session\\)"));
+  EXPECT_EQ(run.messages.find("not checked"), std::string::npos);
+}
+
+TEST_F(KeyedMonitor, JsonSaysWhichKeyWasVerified) {
+  const Outcome run = run_with({.json = true, .count = 1, .key_file = key_file_}, live_stream(2000));
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(run.out, HasSubstr("\"session\":7,\"key_id\":3,"));
+}
+
+TEST_F(KeyedMonitor, WithAStateFileWhatWasSeenIsRefusedAfterARestart) {
+  const std::string state = (folder_ / "state").string();
+  const auto stream = live_stream(3);
+  const MonitorArguments arguments{.count = 3, .key_file = key_file_, .state = state};
+  EXPECT_EQ(run_with(arguments, stream).exit_code, 0);
+  EXPECT_EQ(telemetry::load_marks(state).at(0).session, 7U);
+
+  MonitorArguments again = arguments;
+  again.timeout_s = 0.3;
+  const Outcome replayed = run_with(again, stream);
+  EXPECT_EQ(replayed.exit_code, 1);
+  EXPECT_THAT(replayed.out, HasSubstr("received 0 pairs"));
+  EXPECT_EQ(run_with(again, live_stream(100, 6)).exit_code, 1) << "an older session";
+  EXPECT_EQ(run_with(again, live_stream(100, 8)).exit_code, 0);
+  EXPECT_EQ(telemetry::load_marks(state).at(0).session, 8U);
+}
+
+TEST_F(KeyedMonitor, FilesThatCannotBeUsedAreSaidBeforeListening) {
+  std::ostringstream out;
+  EXPECT_THROW(run_monitor({.listen = "127.0.0.1:0", .key_file = (folder_ / "none").string()}, out, out),
+               telemetry::KeyFileError);
+  EXPECT_THROW(
+      run_monitor({.listen = "127.0.0.1:0", .key_file = key_file_, .state = (folder_ / "none" / "state").string()}, out,
+                  out),
+      telemetry::MarksFileError);
+  const auto bad = folder_.write("bad", "no marks\n");
+  EXPECT_THROW(run_monitor({.listen = "127.0.0.1:0", .key_file = key_file_, .state = bad.string()}, out, out),
+               telemetry::MarksFileError);
+  EXPECT_EQ(out.str(), "");
 }
 
 TEST(Monitor, GarbageIsRefusedCountedAndNoSignOfLife) {
