@@ -92,6 +92,8 @@ struct CalibrationConfig {
 struct TelemetryConfig {
   std::vector<std::string> destinations;  ///< ADDR:PORT or [ADDR6]:PORT; empty: nothing is sent
   std::uint32_t rig_id = 1;               ///< stands in every datagram, tells rigs apart
+  std::string key_file;                   ///< of the key to sign with; empty: datagrams are not signed
+  int multicast_ttl = 1;                  ///< hops that multicast may take
 };
 
 /// Everything the user can say, with its defaults. Plain values: read it anywhere, once loaded it does

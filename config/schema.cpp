@@ -108,6 +108,12 @@ std::vector<Key> keys_of(Configuration& c) {
           "Where the datagrams go over UDP, ADDR:PORT each; empty: nothing is sent."),
       key("telemetry.rig_id", c.telemetry.rig_id, 0, 4294967295.0, "",
           "Number of this rig in every datagram, so that a receiver can tell rigs apart."),
+      key("telemetry.key_file", c.telemetry.key_file, nullptr,
+          "File with the key that stereotrackd signs its datagrams with, readable by its user alone; empty: they are "
+          "not "
+          "signed. Replays never are."),
+      key("telemetry.multicast_ttl", c.telemetry.multicast_ttl, 1, 255, "hops",
+          "How many networks a datagram to a multicast address may cross; 1: it stays in the local one."),
 
       key("equalise.mode", p.equalise,
           {{"off", EqualiseMode::kOff}, {"frame", EqualiseMode::kFrame}, {"frozen", EqualiseMode::kFrozen}},

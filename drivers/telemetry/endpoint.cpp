@@ -79,6 +79,12 @@ Endpoint parse_endpoint(std::string_view text, bool allow_port_0) {
   return endpoint;
 }
 
+std::vector<Endpoint> parse_endpoints(std::span<const std::string> texts) {
+  std::vector<Endpoint> endpoints;
+  for (const std::string& text : texts) endpoints.push_back(parse_endpoint(text));
+  return endpoints;
+}
+
 std::string to_string(const Endpoint& endpoint) {
   const bool v6 = endpoint.family() == AF_INET6;
   const void* number = v6 ? static_cast<const void*>(&reinterpret_cast<const sockaddr_in6*>(endpoint.get())->sin6_addr)

@@ -3,10 +3,12 @@
 #include <sys/socket.h>
 
 #include <cstdint>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace stereotrack::telemetry {
 
@@ -33,6 +35,8 @@ struct Endpoint {
 
 /// Throws EndpointError. Port 0 is refused unless `allow_port_0` (listeners: the system chooses).
 [[nodiscard]] Endpoint parse_endpoint(std::string_view text, bool allow_port_0 = false);
+/// Each of `texts`; throws EndpointError for the first that is none.
+[[nodiscard]] std::vector<Endpoint> parse_endpoints(std::span<const std::string> texts);
 [[nodiscard]] std::string to_string(const Endpoint& endpoint);
 
 /// Owns a file descriptor.

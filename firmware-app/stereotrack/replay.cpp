@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "config/schema.hpp"
+#include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/encoder.hpp"
 #include "drivers/telemetry/file_sink.hpp"
 #include "drivers/telemetry/udp_sender.hpp"
@@ -70,10 +71,7 @@ class Pacer {
 
 // Where telemetry goes. Throws telemetry::EndpointError.
 std::vector<telemetry::Endpoint> destinations_of(const config::Configuration& configuration) {
-  std::vector<telemetry::Endpoint> destinations;
-  for (const std::string& text : configuration.telemetry.destinations) {
-    destinations.push_back(telemetry::parse_endpoint(text));
-  }
+  std::vector<telemetry::Endpoint> destinations = telemetry::parse_endpoints(configuration.telemetry.destinations);
   if (destinations.empty()) {
     destinations.push_back(telemetry::parse_endpoint("127.0.0.1:" + std::to_string(telemetry::kDefaultPort)));
   }
@@ -95,7 +93,11 @@ class Replay {
       make_output_folder(*arguments.out);
       file_ = std::make_unique<telemetry::FileSink>(fs::path(*arguments.out) / "telemetry.bin");
     }
-    if (arguments.real_time) udp_ = std::make_unique<telemetry::UdpSender>(destinations_of(rig_.configuration()));
+    if (arguments.real_time) {
+      udp_ = std::make_unique<telemetry::UdpSender>(
+          destinations_of(rig_.configuration()),
+          telemetry::UdpSender::Config{.multicast_hops = rig_.configuration().telemetry.multicast_ttl});
+    }
     if (arguments.render) {
       renderer_ = render::make_renderer(*arguments.render, rig_.source->info(), pipeline_.rectifier(), rig_.unit_m);
     }
@@ -229,7 +231,7 @@ class Replay {
       message.flags |= telemetry::kLate;
     }
     for (const std::span<const std::byte> datagram : encoder_.encode(message, buffer_)) {
-      payloads_.add(datagram);
+      payloads_.add(telemetry::payload_of(datagram));
       ++summary_.telemetry_sent;
       if (file_) file_->send(datagram);
       if (udp_) udp_->send(datagram);

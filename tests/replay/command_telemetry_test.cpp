@@ -75,6 +75,51 @@ TEST(Telemetry, MonitorThatHearsNothingFailsAfterItsTimeout) {
   EXPECT_NE(result.err.find("nothing valid received"), std::string::npos) << result.err;
 }
 
+TEST(Telemetry, MonitorWithAKeyRefusesAReplayWhichIsNeverSigned) {
+  const TempDir folder;
+  SmallScene::write(folder / "scene", 3);
+  const std::string key = folder.write("telemetry.key", "1 " + std::string(64, 'a') + "\n").string();
+  fs::permissions(key, fs::perms::owner_read);
+  const std::string address = "127.0.0.1:" + std::to_string(free_port());
+  ProgramOptions options;
+  options.signal = SIGINT;  // when it is waited for, that is after the replay
+  options.signal_after = std::chrono::milliseconds(200);
+  Program monitor(command({"monitor", "--listen", address, "--key-file", key, "--state", (folder / "seen").string()}),
+                  options);
+  const auto start = std::chrono::steady_clock::now();
+  while (monitor.err_so_far().find("listening on " + address) == std::string::npos) {
+    ASSERT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  const ProgramResult sent =
+      stereotrack_command({"replay", (folder / "scene").string(), "--pace", "real", "--set",
+                           "telemetry.destinations=" + address, "--set", "telemetry.key_file=" + key});
+  const ProgramResult received = monitor.wait();
+  EXPECT_EQ(sent.exit_code, 0) << sent.err;
+  EXPECT_EQ(received.exit_code, 0) << received.err;
+  EXPECT_NE(received.out.find("received 0 pairs in 3 datagrams, lost 0, refused 3 (3 unsigned)"), std::string::npos)
+      << received.out;
+}
+
+TEST(Telemetry, KeyFilesThatCannotBeUsedExitWithTwoAndOneLine) {
+  const TempDir folder;
+  const std::string key = folder.write("telemetry.key", "1 " + std::string(64, 'a') + "\n").string();
+  fs::permissions(key, fs::perms::owner_read | fs::perms::others_read);
+  ProgramResult result = stereotrack_command({"monitor", "--listen", "127.0.0.1:0", "--key-file", key});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.err, "stereotrack: key file " + key + ": others may read or write it; run: chmod 600 " + key + "\n");
+
+  fs::permissions(key, fs::perms::owner_read);
+  const std::string state = folder.write("state", "no marks\n").string();
+  result = stereotrack_command({"monitor", "--listen", "127.0.0.1:0", "--key-file", key, "--state", state});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_NE(result.err.find(state + ": line 1 is not RIG SESSION MESSAGE STATUS"), std::string::npos) << result.err;
+
+  result = stereotrack_command({"monitor", "--listen", "127.0.0.1:0", "--state", state});
+  EXPECT_EQ(result.exit_code, 2) << "marks without keys would be anybody's";
+}
+
 TEST(Telemetry, DestinationThatIsNoAddressExitsWithTwo) {
   const TempDir folder;
   SmallScene::write(folder / "scene", 2);

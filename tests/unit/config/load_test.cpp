@@ -235,6 +235,22 @@ TEST(LoadDestinations, FormIsChecked) {
             "or \"[fe80::1]:9000\"");
 }
 
+TEST(LoadTelemetry, KeyFileAndMulticastTtlAreTaken) {
+  const auto telemetry = load(Layers{text_layer("rig.toml",
+                                                "[telemetry]\nkey_file = \"/etc/stereotrack/telemetry.key\"\n"
+                                                "multicast_ttl = 8\n")})
+                             .configuration.telemetry;
+  EXPECT_EQ(telemetry.key_file, "/etc/stereotrack/telemetry.key");
+  EXPECT_EQ(telemetry.multicast_ttl, 8);
+  const auto defaults = load(Layers{}).configuration.telemetry;
+  EXPECT_EQ(defaults.key_file, "") << "not signed";
+  EXPECT_EQ(defaults.multicast_ttl, 1) << "stays in the local network";
+  EXPECT_EQ(override_refused("telemetry.multicast_ttl=255"), "");
+  EXPECT_EQ(override_refused("telemetry.multicast_ttl=256"),
+            "--set telemetry.multicast_ttl=256: telemetry.multicast_ttl: 256 is out of range: give 1 to 255 hops");
+  EXPECT_NE(override_refused("telemetry.multicast_ttl=0"), "");
+}
+
 TEST_F(LoadFile, IsReadAndNamedInErrors) {
   const std::string path = write("rig.toml", "\xEF\xBB\xBF[source]\r\nfps = 12\r\n");  // byte-order mark and CRLF
   EXPECT_EQ(load(Layers{file_layer(path)}).configuration.source.fps, 12);

@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -66,6 +67,17 @@ TEST(Endpoint, AddressesOfBothFamiliesRoundTrip) {
   EXPECT_TRUE(parse_endpoint("[ff02::1]:1").is_multicast());
 }
 
+TEST(Endpoint, AListIsReadInItsOrderAndItsMistakeIsNamed) {
+  const std::vector<std::string> good{"127.0.0.1:1", "239.1.2.3%lo:2"};
+  const auto endpoints = parse_endpoints(good);
+  ASSERT_EQ(endpoints.size(), 2U);
+  EXPECT_EQ(to_string(endpoints[0]), good[0]);
+  EXPECT_EQ(to_string(endpoints[1]), good[1]);
+  EXPECT_TRUE(parse_endpoints({}).empty());
+  const std::vector<std::string> bad{"127.0.0.1:1", "rig:2"};
+  EXPECT_THROW((void)parse_endpoints(bad), EndpointError);
+}
+
 TEST(Endpoint, EachMistakeIsNamed) {
   EXPECT_THAT(message_of("127.0.0.1"), HasSubstr("'127.0.0.1' is not ADDR:PORT: no port"));
   EXPECT_THAT(message_of(""), HasSubstr("no port"));
@@ -123,6 +135,94 @@ TEST(UdpSender, MulticastIsHeardOnThisMachine) {
   sender.send(bytes);
   if (sender.counters().failed > 0) GTEST_SKIP() << "no multicast here: " << std::strerror(sender.last_error());
   EXPECT_EQ(next(listener), bytes);
+}
+
+/// The TTL or hop limit with which a datagram came; -1 if none did within 5 s.
+int hops_of_next(UdpListener& listener) {
+  pollfd poll{listener.fd(), POLLIN, 0};
+  if (::poll(&poll, 1, 5000) != 1) return -1;
+  std::array<char, 64> data{};
+  alignas(cmsghdr) std::array<char, 128> control{};
+  iovec part{data.data(), data.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  if (::recvmsg(listener.fd(), &message, MSG_DONTWAIT) < 0) return -1;
+  for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
+    if (c->cmsg_level == IPPROTO_IP && c->cmsg_type == IP_TTL) {
+      int ttl = 0;
+      std::memcpy(&ttl, CMSG_DATA(c), sizeof ttl);
+      return ttl;
+    }
+  }
+  return -1;
+}
+
+TEST(UdpSender, MulticastTakesAsManyHopsAsItIsToldOverTheInterfaceItIsTold) {
+  UdpListener listener(parse_endpoint("239.255.47.81%lo:0", true));
+  const int on = 1;
+  ASSERT_EQ(::setsockopt(listener.fd(), IPPROTO_IP, IP_RECVTTL, &on, sizeof on), 0);
+  const std::array to{listener.local()};
+  for (const int hops : {1, 8, 255}) {
+    UdpSender sender(to, {.multicast_hops = hops});
+    sender.send(Bytes(10));
+    if (sender.counters().failed > 0) GTEST_SKIP() << "no multicast here: " << std::strerror(sender.last_error());
+    EXPECT_EQ(hops_of_next(listener), hops);
+  }
+  UdpSender local(to);
+  local.send(Bytes(10));
+  EXPECT_EQ(hops_of_next(listener), 1) << "stays in the local network";
+}
+
+TEST(UdpSender, HopsThatDoNotExistAreRefusedWithTheDestination) {
+  const std::array to{parse_endpoint("239.255.47.81:9")};
+  try {
+    const UdpSender sender(to, {.multicast_hops = 256});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("telemetry to 239.255.47.81:9: cannot set the multicast hops"));
+  }
+}
+
+TEST(UdpSender, UnicastAndMulticastDestinationsGoTogether) {
+  UdpListener unicast(parse_endpoint("127.0.0.1:0", true));
+  UdpListener first(parse_endpoint("239.255.47.82%lo:0", true));
+  UdpListener second(first.local());
+  const std::array to{unicast.local(), first.local()};
+  UdpSender sender(to);
+  const Bytes bytes(10, std::byte{7});
+  sender.send(bytes);
+  if (sender.counters().failed > 0) GTEST_SKIP() << "no multicast here: " << std::strerror(sender.last_error());
+  EXPECT_EQ(next(unicast), bytes);
+  EXPECT_EQ(next(first), bytes);
+  EXPECT_EQ(next(second), bytes) << "several listeners of a group on one machine";
+  EXPECT_EQ(sender.counters().sent, 2U);
+}
+
+TEST(UdpSender, ADestinationThatIsFullDoesNotStarveTheOthers) {
+  int full[2];
+  int open[2];
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, full), 0);
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, open), 0);
+  const Socket never_read(full[1]);
+  const Socket reader(open[1]);
+  const int least = 1;  // the kernel makes it its own minimum
+  ASSERT_EQ(::setsockopt(full[0], SOL_SOCKET, SO_SNDBUF, &least, sizeof least), 0);
+  std::vector<Socket> connected;
+  connected.emplace_back(full[0]);
+  connected.emplace_back(open[0]);
+  UdpSender sender(std::move(connected));
+  const Bytes bytes(kMaxDatagramBytes, std::byte{1});
+  Bytes room(2048);
+  for (int i = 0; i < 100; ++i) {
+    sender.send(bytes);
+    ASSERT_EQ(::recv(reader.fd(), room.data(), room.size(), MSG_DONTWAIT), static_cast<ssize_t>(bytes.size())) << i;
+  }
+  EXPECT_GT(sender.counters().dropped, 90U) << "a buffer of a few kilobytes";
+  EXPECT_EQ(sender.counters().sent + sender.counters().dropped, 200U);
+  EXPECT_EQ(sender.counters().failed, 0U);
 }
 
 TEST(UdpSender, EveryDestinationGetsEveryDatagram) {
