@@ -406,7 +406,13 @@ RegionMatch Pipeline::match_region(CanvasPair& pair, LazyCanvas& right_moving, c
 
 void Pipeline::match_blob(const Blob& blob) noexcept {
   const Rect roi = rectifier_->on_left_canvas(blob.box);
-  if (roi.empty()) return;
+  if (roi.empty()) {
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
+      disparity_.at(x, y) = kNoDisparity;
+      if (background_right_) old_disparity_.at(x, y) = kNoDisparity;
+    });
+    return;
+  }
   if (config_.disparity.mode == DisparityMode::kRegions) {
     const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
     for (int y = roi.top; y < roi.bottom(); ++y) {
@@ -432,6 +438,11 @@ void Pipeline::match_blob(const Blob& blob) noexcept {
 
 void Pipeline::find_disparity() noexcept {
   if (config_.disparity.mode == DisparityMode::kDense) (void)matcher_->run(canvases_, canvas_disparity_);
+  if (level_set_ && background_right_) {  // holes that it leaves are filled later, with pixels that nobody matched
+    const Rect all{0, 0, setup_.width, setup_.height};
+    fill(disparity_, all, kNoDisparity);
+    fill(old_disparity_, all, kNoDisparity);
+  }
   for (const Blob& blob : blobs_.blobs) {
     if (blob.area > 0) match_blob(blob);
   }
