@@ -286,13 +286,13 @@ Result<FrameResult> Pipeline::run(const FramePair& pair) noexcept {
 }
 
 void Pipeline::ingest(const FramePair& pair) noexcept {
-  const auto take = [](const Picture& picture, const Planes& view, Equalise& equalise) {
+  const auto take = [](const Picture& picture, const Planes& view, Equalise& equalise, std::uint8_t* copy) {
     Histogram histogram{};
-    ingest_picture(picture, {view.y, view.cb, view.cr}, equalise.needs_histogram() ? &histogram : nullptr);
+    ingest_picture(picture, {view.y, view.cb, view.cr}, equalise.needs_histogram() ? &histogram : nullptr, copy);
     equalise.run(histogram, view.y);
   };
-  take(pair.left, left_, equalise_left_);
-  if (rectifier_) take(pair.right, right_, equalise_right_);
+  take(pair.left, left_, equalise_left_, pair.left_copy);
+  if (rectifier_) take(pair.right, right_, equalise_right_, pair.right_copy);
   if (background_left_) {
     smooth3x3(left_.y, left_.smooth_y);
     if (setup_.colour) {

@@ -90,7 +90,6 @@ class AdaptiveBackground {
   template <class Self, class Archive>
   static void visit_state(Self& self, Archive& archive) noexcept {
     archive(self.started_);
-    archive.bounded(self.gain_, 64, 1023);
     for (auto* channel : {&self.y_, &self.cb_, &self.cr_}) {
       archive(channel->mean, channel->deviation, channel->candidate);
     }

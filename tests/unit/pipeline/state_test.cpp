@@ -157,6 +157,49 @@ TEST(PipelineStateBlock, PartsJoinToTheWhole) {
   }
 }
 
+// A disc has more corners than a hull has room for, and each such hull is counted since create().
+TEST(PipelineStateBlock, CountersGoOn) {
+  constexpr int kSide = 320;
+  std::vector<std::uint8_t> picture(std::size_t{kSide} * kSide);
+  const auto frame = [&](int ordinal) {
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        const int dx = x - 150 - ordinal;
+        const int dy = y - 160;
+        picture[static_cast<std::size_t>(y) * kSide + x] = ordinal > 4 && dx * dx + dy * dy < 120 * 120 ? 200 : 60;
+      }
+    }
+    FramePair pair;
+    pair.ordinal = static_cast<std::uint64_t>(ordinal);
+    pair.capture_time = CaptureTime(std::chrono::milliseconds(33 * ordinal));
+    pair.left = {picture.data(), kSide, kSide, kSide, PixelFormat::kGrey8};
+    return pair;
+  };
+  const std::vector<config::Layer> layers{config::override_layer("level_set.on=true")};
+  const PipelineConfig config = config::load(layers).configuration.pipeline;
+  Arena arena;
+  Pipeline::Setup setup;
+  setup.width = setup.height = kSide;
+  Result<Pipeline> one = Pipeline::create(config, setup, arena);
+  Result<Pipeline> two = Pipeline::create(config, setup, arena);
+  ASSERT_TRUE(one.has_value() && two.has_value());
+  std::uint64_t reduced = 0;
+  for (int ordinal = 1; ordinal <= 8; ++ordinal) {
+    const Result<FrameResult> result = one->run(frame(ordinal));
+    ASSERT_TRUE(result.has_value());
+    reduced = result->hulls_reduced;
+  }
+  ASSERT_GE(reduced, 6U) << "of the level set's hulls and of the detector's";
+  std::vector<std::byte> block(one->state_bytes());
+  const Result<std::size_t> bytes = one->save_state(block);
+  ASSERT_TRUE(bytes.has_value());
+  ASSERT_TRUE(two->restore_state(std::span<const std::byte>(block).first(*bytes)).has_value());
+  const Result<FrameResult> first = one->run(frame(9));
+  const Result<FrameResult> second = two->run(frame(9));
+  ASSERT_TRUE(first.has_value() && second.has_value());
+  EXPECT_EQ(second->hulls_reduced, first->hulls_reduced);
+}
+
 TEST(PipelineStateBlock, NoRoomIsAFaultAndNothingIsWritten) {
   ScenePipeline run(robust());
   std::vector<std::byte> small(run.save().size() - 1, std::byte{9});
