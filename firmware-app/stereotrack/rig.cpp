@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "config/calibration/check.hpp"
 #include "config/calibration/read_calibration.hpp"
@@ -63,8 +64,9 @@ FrameRange parse_frames(const std::string& text) {
   return range;
 }
 
-config::Loaded load_configuration(const std::optional<std::string>& file, const std::vector<std::string>& set) {
-  std::vector<config::Layer> layers;
+config::Loaded load_configuration(const std::optional<std::string>& file, const std::vector<std::string>& set,
+                                  std::vector<config::Layer> below) {
+  std::vector<config::Layer> layers = std::move(below);
   if (file) layers.push_back(config::file_layer(*file));
   for (const std::string& entry : set) layers.push_back(config::override_layer(entry));
   return config::load(layers);
@@ -76,7 +78,20 @@ Rig open_rig(const RigArguments& arguments) {
   const fs::path folder = synthetic ? fs::path() : folder_of(arguments.source);
   std::optional<std::string> file = arguments.config;
   if (!file && !synthetic && fs::exists(folder / "stereotrack.toml")) file = (folder / "stereotrack.toml").string();
-  rig.loaded = load_configuration(file, arguments.set);
+  std::vector<config::Layer> below;
+  if (record::is_recording(arguments.source)) {
+    auto recording = std::make_unique<record::RecordingSource>(arguments.source);
+    if (!arguments.config) {
+      file.reset();
+      below.push_back(config::text_layer(arguments.source, recording->configuration()));
+    }
+    rig.calibration = recording->calibration();
+    rig.calibration_name = arguments.source;
+    rig.unit_m = recording->about().unit_m;
+    rig.recording = recording.get();
+    rig.source = std::move(recording);
+  }
+  rig.loaded = load_configuration(file, arguments.set, std::move(below));
   const config::Configuration& configuration = rig.configuration();
 
   if (synthetic) {
@@ -96,7 +111,7 @@ Rig open_rig(const RigArguments& arguments) {
     rig.calibration_name = arguments.source;
     rig.unit_m = 1;
     rig.source = std::move(scene);
-  } else {
+  } else if (rig.recording == nullptr) {
     rig.source = capture::open_replay(arguments.source, {.fps = configuration.source.fps,
                                                          .flip = configuration.source.flip,
                                                          .swap = configuration.source.swap,

@@ -8,6 +8,7 @@
 
 #include "config/load.hpp"
 #include "drivers/capture/frame_source.hpp"
+#include "drivers/record/recording_source.hpp"
 #include "pipeline/core/arena.hpp"
 #include "pipeline/pipeline.hpp"
 
@@ -17,8 +18,8 @@ namespace stereotrack {
 struct RigArguments {
   std::string source;                      ///< SOURCE
   std::optional<std::string> calibration;  ///< --calibration; else the source's own folder is asked
-  std::optional<std::string> config;       ///< --config; else stereotrack.toml in the source's folder
-  std::vector<std::string> set;            ///< --set KEY=VALUE, in order
+  std::optional<std::string> config;  ///< --config; else the recording's, or stereotrack.toml in the source's folder
+  std::vector<std::string> set;       ///< --set KEY=VALUE, in order
 };
 
 /// Ordinals from `first` to `last`, both included.
@@ -30,17 +31,19 @@ struct FrameRange {
 /// A:B, A:, :B, or N. Throws config::Error.
 [[nodiscard]] FrameRange parse_frames(const std::string& text);
 
-/// Configuration alone: preset, file, --set. Throws config::Error.
+/// Configuration alone: preset, what lies below (a recording's own), file, --set. Throws config::Error.
 [[nodiscard]] config::Loaded load_configuration(const std::optional<std::string>& file,
-                                                const std::vector<std::string>& set);
+                                                const std::vector<std::string>& set,
+                                                std::vector<config::Layer> below = {});
 
 /// A source, its calibration and configuration, opened and checked against each other.
 struct Rig {
   config::Loaded loaded;
   std::unique_ptr<capture::FrameSource> source;
-  std::optional<StereoCalibration> calibration;  ///< none for mono
-  std::string calibration_name;                  ///< for messages
-  double unit_m = 0;                             ///< metres in one unit of the calibration, 0 = not known
+  const record::RecordingSource* recording = nullptr;  ///< the source, where it is a recording of ours
+  std::optional<StereoCalibration> calibration;        ///< none for mono
+  std::string calibration_name;                        ///< for messages
+  double unit_m = 0;                                   ///< metres in one unit of the calibration, 0 = not known
 
   [[nodiscard]] const config::Configuration& configuration() const noexcept { return loaded.configuration; }
 };
