@@ -38,6 +38,12 @@ enum class PixelFormat : std::uint8_t {
   return format == PixelFormat::kNv12 ? height + height / 2 : height;
 }
 
+/// Bytes of a picture whose rows lie close together.
+[[nodiscard]] constexpr std::size_t picture_bytes(PixelFormat format, int width, int height) noexcept {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(bytes_per_pixel(format)) *
+         static_cast<std::size_t>(memory_rows(format, height));
+}
+
 /// Whether a picture of that size can have the format.
 [[nodiscard]] constexpr bool fits_format(PixelFormat format, int width, int height) noexcept {
   const bool in_pairs = format == PixelFormat::kYuyv || format == PixelFormat::kUyvy || format == PixelFormat::kNv12;
@@ -64,6 +70,8 @@ struct FramePair {
   std::optional<std::chrono::nanoseconds> skew;  ///< right capture time - left; none: one stamp for both, or mono
   Picture left;
   Picture right;
+  std::uint8_t* left_copy = nullptr;   ///< where ingest puts the picture's bytes, too (picture_bytes()); null: nowhere
+  std::uint8_t* right_copy = nullptr;  ///< likewise
 };
 
 }  // namespace stereotrack

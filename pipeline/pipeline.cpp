@@ -292,13 +292,13 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
 }
 
 void Pipeline::ingest(const FramePair& pair) noexcept {
-  const auto take = [](const Picture& picture, const Planes& view, Equalise& equalise) {
+  const auto take = [](const Picture& picture, const Planes& view, Equalise& equalise, std::uint8_t* copy) {
     Histogram histogram{};
-    ingest_picture(picture, {view.y, view.cb, view.cr}, equalise.needs_histogram() ? &histogram : nullptr);
+    ingest_picture(picture, {view.y, view.cb, view.cr}, equalise.needs_histogram() ? &histogram : nullptr, copy);
     equalise.run(histogram, view.y);
   };
-  take(pair.left, left_, equalise_left_);
-  if (rectifier_) take(pair.right, right_, equalise_right_);
+  take(pair.left, left_, equalise_left_, pair.left_copy);
+  if (rectifier_) take(pair.right, right_, equalise_right_, pair.right_copy);
   if (background_left_) {
     smooth3x3(left_.y, left_.smooth_y);
     if (setup_.colour) {
@@ -413,7 +413,13 @@ RegionMatch Pipeline::match_region(CanvasPair& pair, LazyCanvas& right_moving, c
 
 void Pipeline::match_blob(const Blob& blob) noexcept {
   const Rect roi = rectifier_->on_left_canvas(blob.box);
-  if (roi.empty()) return;
+  if (roi.empty()) {
+    for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
+      disparity_.at(x, y) = kNoDisparity;
+      if (background_right_) old_disparity_.at(x, y) = kNoDisparity;
+    });
+    return;
+  }
   if (disparity_mode() == DisparityMode::kRegions) {
     const ImageView<const Rectifier::Point16> raw = rectifier_->raw_from_rectified(View::kLeft);
     for (int y = roi.top; y < roi.bottom(); ++y) {
@@ -443,6 +449,11 @@ DisparityMode Pipeline::disparity_mode() const noexcept {
 
 void Pipeline::find_disparity() noexcept {
   if (disparity_mode() == DisparityMode::kDense) (void)matcher_->run(canvases_, canvas_disparity_);
+  if (level_set_ && background_right_) {  // holes that it leaves are filled later, with pixels that nobody matched
+    const Rect all{0, 0, setup_.width, setup_.height};
+    fill(disparity_, all, kNoDisparity);
+    fill(old_disparity_, all, kNoDisparity);
+  }
   for (const Blob& blob : blobs_.blobs) {
     if (blob.area > 0) match_blob(blob);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -84,6 +85,21 @@ class Pipeline {
   /// Pixels are read until Stage::kIngest has ended, and not after. Faults, state untouched: kBadSize, kBadFormat.
   [[nodiscard]] Result<FrameResult> run(const FramePair& pair, EffortBits leave_out = 0) noexcept;
 
+  /// Everything that crosses frames as one block (pipeline/core/state_block.hpp): a pipeline of the same configuration
+  /// and set-up that takes it goes on to the byte as this one does. Between runs, when nothing changes it: as a whole,
+  ///     save_state(out)                      returns its size; fault, out untouched: kBadSize, out is too small
+  /// or, where that would take longer than there is time between two frames, part by part, before the next run:
+  ///     copy_state_part(first, out)          writes bytes [first, first + out.size()) of the block, returns how many
+  ///                                          there were; fewer than out holds: that was the last
+  ///     seal_state(block)                    once all parts are there; any thread
+  /// O(bytes): 30 bytes a pixel in colour and stereo with the robust preset, docs/RECORDING.md has the time.
+  [[nodiscard]] std::size_t state_bytes() const noexcept;  ///< the most that a block can have
+  [[nodiscard]] Result<std::size_t> save_state(std::span<std::byte> out) const noexcept;
+  [[nodiscard]] std::size_t copy_state_part(std::size_t first, std::span<std::byte> out) const noexcept;
+
+  /// Fault: kBadState, state untouched (but by a block that was made up together with its checksum).
+  [[nodiscard]] Result<void> restore_state(std::span<const std::byte> block) noexcept;
+
   /// Null for mono.
   [[nodiscard]] const Rectifier* rectifier() const noexcept { return rectifier_ ? &*rectifier_ : nullptr; }
 
@@ -105,6 +121,9 @@ class Pipeline {
 
   explicit Pipeline(const PipelineConfig& config, const Setup& setup) noexcept : config_(config), setup_(setup) {}
 
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept;
+  [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   [[nodiscard]] Result<void> create_foreground(Arena& arena) noexcept;
   [[nodiscard]] Result<void> create_stereo(Arena& arena) noexcept;
   void ended(Stage stage) const noexcept {
@@ -185,6 +204,6 @@ class Pipeline {
   std::optional<Detector> detector_;
   std::optional<Tracker> tracker_;
 };
-static_assert(RealTimeStage<Pipeline, &Pipeline::run>);
+static_assert(RealTimeStage<Pipeline, &Pipeline::run, &Pipeline::save_state, &Pipeline::copy_state_part>);
 
 }  // namespace stereotrack

@@ -47,10 +47,11 @@ class Encoder {
     std::uint32_t rig = 0;
     std::uint64_t session = 0;
     const Signer* signer = nullptr;  ///< must outlive the encoder; null: datagrams are not signed
+    std::uint64_t sequence = 0;      ///< of the message before the first: a replay goes on where its recording began
   };
   using Parts = FixedVector<std::span<const std::byte>, kMaxParts>;
 
-  explicit Encoder(const Config& config) noexcept : config_(config) {}
+  explicit Encoder(const Config& config) noexcept : config_(config), sequence_(config.sequence) {}
 
   /// The datagrams, as views of `out`, in the order to send them. A message without targets is one part.
   [[nodiscard]] Parts encode(const Message& message, std::span<std::byte, kMaxMessageBytes> out) noexcept;
@@ -69,7 +70,7 @@ class Encoder {
 
  private:
   Config config_;
-  std::uint64_t sequence_ = 0;
+  std::uint64_t sequence_;
   std::uint64_t status_sequence_ = 0;
 };
 

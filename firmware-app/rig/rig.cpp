@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <ostream>
 #include <stdexcept>
+#include <utility>
 
 #include "config/calibration/check.hpp"
 #include "config/rules.hpp"
@@ -10,8 +11,9 @@
 
 namespace stereotrack {
 
-config::Loaded load_configuration(const std::optional<std::string>& file, const std::vector<std::string>& set) {
-  std::vector<config::Layer> layers;
+config::Loaded load_configuration(const std::optional<std::string>& file, const std::vector<std::string>& set,
+                                  std::vector<config::Layer> below) {
+  std::vector<config::Layer> layers = std::move(below);
   if (file) layers.push_back(config::file_layer(*file));
   for (const std::string& entry : set) layers.push_back(config::override_layer(entry));
   return config::load(layers);

@@ -10,6 +10,7 @@
 #include "config/calibration/read_calibration.hpp"
 #include "config/load.hpp"
 #include "drivers/capture/frame_source.hpp"
+#include "drivers/record/recording_source.hpp"
 #include "pipeline/core/arena.hpp"
 #include "pipeline/pipeline.hpp"
 
@@ -24,16 +25,18 @@ inline constexpr std::string_view kSynthetic = "synthetic:";
 struct Rig {
   config::Loaded loaded;
   std::unique_ptr<capture::FrameSource> source;
-  std::optional<StereoCalibration> calibration;  ///< none for mono
-  std::string calibration_name;                  ///< for messages
-  double unit_m = 0;                             ///< metres in one unit of the calibration, 0 = not known
+  const record::RecordingSource* recording = nullptr;  ///< the source, where it is a recording of ours
+  std::optional<StereoCalibration> calibration;        ///< none for mono
+  std::string calibration_name;                        ///< for messages
+  double unit_m = 0;                                   ///< metres in one unit of the calibration, 0 = not known
 
   [[nodiscard]] const config::Configuration& configuration() const noexcept { return loaded.configuration; }
 };
 
-/// Preset, file, then --set entries.
+/// Preset, what lies below (a recording's own), file, then --set entries.
 [[nodiscard]] config::Loaded load_configuration(const std::optional<std::string>& file,
-                                                const std::vector<std::string>& set);
+                                                const std::vector<std::string>& set,
+                                                std::vector<config::Layer> below = {});
 
 /// Draws synthetic:NAME, which brings its calibration, as [synthetic] and source.fps say.
 void open_scene(const std::string& name, Rig& rig);

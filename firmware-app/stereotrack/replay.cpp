@@ -78,6 +78,16 @@ std::vector<telemetry::Endpoint> destinations_of(const config::Configuration& co
   return destinations;
 }
 
+// Who the telemetry says it is: the run that an exact recording is of, message for message.
+telemetry::Encoder::Config identity_of(const Rig& rig) {
+  telemetry::Encoder::Config config{.rig = rig.configuration().telemetry.rig_id, .session = kReplaySession};
+  if (rig.recording == nullptr || !rig.recording->about().exact) return config;
+  config.rig = rig.recording->about().rig;
+  config.session = rig.recording->about().session;
+  if (const record::OutputNote* first = rig.recording->first_output()) config.sequence = first->sequence - 1;
+  return config;
+}
+
 // Everything that one replay carries from frame to frame.
 class Replay {
  public:
@@ -87,7 +97,7 @@ class Replay {
         messages_(messages),
         rig_(open_rig(arguments.rig)),
         pipeline_(make_pipeline(rig_, rig_.source->info(), arena_, times_.observer())),
-        encoder_({.rig = rig_.configuration().telemetry.rig_id, .session = kReplaySession}) {
+        encoder_(identity_of(rig_)) {
     arena_.seal();
     if (arguments.out) {
       make_output_folder(*arguments.out);
@@ -112,6 +122,7 @@ class Replay {
     if (info.format == PixelFormat::kGrey8) messages_ << info.name << ": grey source, the chroma tests are skipped\n";
     if (!info.stereo) messages_ << info.name << ": mono source, 2-D tracks without distance\n";
     if (arguments_.frames.first > 1) rig_.source->skip_to(arguments_.frames.first - 1);
+    if (rig_.recording != nullptr) begin_recording(*rig_.recording);
     std::optional<std::uint64_t> expected;
     if (info.pairs)
       expected = std::min(*info.pairs, arguments_.frames.last) - std::min(*info.pairs, arguments_.frames.first - 1);
@@ -179,6 +190,19 @@ class Replay {
   }
 
  private:
+  // A recording's pairs go on from the state in which its run was, and with the decisions that were made.
+  void begin_recording(const record::RecordingSource& recording) {
+    if (!recording.warning().empty()) messages_ << recording.warning() << '\n';
+    if (recording.keyframe().empty()) {
+      messages_ << recording.info().name << ": tracks begin anew: "
+                << (recording.about().exact ? "frames were left out\n" : "it was reduced, or holds no keyframe\n");
+    } else if (!pipeline_.restore_state(recording.keyframe())) {
+      messages_ << recording.info().name
+                << ": tracks begin anew: its keyframe is of another configuration or version; replay without --config "
+                   "and --set to go on from it\n";
+    }
+  }
+
   void skip(Progress& progress) {
     ++summary_.skipped;
     skipped_before_ = true;
@@ -191,7 +215,8 @@ class Replay {
     if (!pair.right.empty()) pixels_.add(pair.right);
     times_.frame_begins();
     const std::uint64_t before = allocations_of_this_thread();
-    const Result<FrameResult> result = pipeline_.run(pair);
+    const EffortBits leave_out = rig_.recording != nullptr ? rig_.recording->decisions().shed : EffortBits{0};
+    const Result<FrameResult> result = pipeline_.run(pair, leave_out);
     if (!result.has_value()) {
       throw std::runtime_error(rig_.source->info().name + ": pair " + std::to_string(pair.ordinal) + ": " +
                                to_string(result.error()));
@@ -225,6 +250,15 @@ class Replay {
     if (rig_.calibration) {
       message.focal_x_px = rig_.calibration->left.fx;
       message.focal_y_px = rig_.calibration->left.fy;
+    }
+    if (rig_.recording != nullptr && rig_.recording->has_outputs()) {
+      const record::OutputNote* output = rig_.recording->output_of(pair.ordinal);
+      if (output == nullptr) return;  // in the run none left for this pair either
+      message.send_time = CaptureTime(std::chrono::nanoseconds(output->send_ns));
+      message.latency = std::chrono::nanoseconds(output->latency_ns);
+      message.flags = output->flags;
+      message.frames_skipped = output->frames_skipped;
+      message.tracks_dropped = output->tracks_dropped;
     }
     if (arguments_.real_time && pacer_.wait(message.send_time)) {
       ++summary_.deadline_misses;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "drivers/capture/replay/replay.hpp"
 
@@ -63,12 +64,25 @@ Rig open_rig(const RigArguments& arguments) {
   const fs::path folder = synthetic ? fs::path() : folder_of(arguments.source);
   std::optional<std::string> file = arguments.config;
   if (!file && !synthetic && fs::exists(folder / "stereotrack.toml")) file = (folder / "stereotrack.toml").string();
-  rig.loaded = load_configuration(file, arguments.set);
+  std::vector<config::Layer> below;
+  if (record::is_recording(arguments.source)) {
+    auto recording = std::make_unique<record::RecordingSource>(arguments.source);
+    if (!arguments.config) {
+      file.reset();
+      below.push_back(config::text_layer(arguments.source, recording->configuration()));
+    }
+    rig.calibration = recording->calibration();
+    rig.calibration_name = arguments.source;
+    rig.unit_m = recording->about().unit_m;
+    rig.recording = recording.get();
+    rig.source = std::move(recording);
+  }
+  rig.loaded = load_configuration(file, arguments.set, std::move(below));
   const config::Configuration& configuration = rig.configuration();
 
   if (synthetic) {
     open_scene(arguments.source, rig);
-  } else {
+  } else if (rig.recording == nullptr) {
     rig.source = capture::open_replay(arguments.source, {.fps = configuration.source.fps,
                                                          .flip = configuration.source.flip,
                                                          .swap = configuration.source.swap,

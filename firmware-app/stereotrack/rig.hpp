@@ -13,8 +13,8 @@ namespace stereotrack {
 struct RigArguments {
   std::string source;                      ///< SOURCE
   std::optional<std::string> calibration;  ///< --calibration; else the source's own folder is asked
-  std::optional<std::string> config;       ///< --config; else stereotrack.toml in the source's folder
-  std::vector<std::string> set;            ///< --set KEY=VALUE, in order
+  std::optional<std::string> config;  ///< --config; else the recording's, or stereotrack.toml in the source's folder
+  std::vector<std::string> set;       ///< --set KEY=VALUE, in order
 };
 
 /// Ordinals from `first` to `last`, both included.

@@ -10,6 +10,10 @@ struct Point {
   std::int32_t x = 0;
   std::int32_t y = 0;
   friend bool operator==(const Point&, const Point&) = default;
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.x, self.y);
+  }
 };
 
 /// Pixels x in [left, left + width), y in [top, top + height).
@@ -24,6 +28,10 @@ struct Rect {
   [[nodiscard]] bool empty() const noexcept { return width <= 0 || height <= 0; }
   [[nodiscard]] std::int64_t area() const noexcept { return empty() ? 0 : static_cast<std::int64_t>(width) * height; }
   friend bool operator==(const Rect&, const Rect&) = default;
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.left, self.top, self.width, self.height);
+  }
 };
 
 /// Common part; empty (0 x 0) if there is none.

@@ -14,6 +14,7 @@ enum class Fault : std::uint8_t {
   kBadFormat,        ///< a pixel format that the stage does not read
   kNotFinite,        ///< a NaN or an infinity reached a boundary
   kSingular,         ///< a matrix that must be inverted is not invertible
+  kBadState,         ///< a block of state that is damaged, or of another version, size or configuration
 };
 
 /// One line for people. Never null.
@@ -25,6 +26,7 @@ enum class Fault : std::uint8_t {
     case Fault::kBadFormat: return "pixel format not supported";
     case Fault::kNotFinite: return "value not finite";
     case Fault::kSingular: return "singular matrix";
+    case Fault::kBadState: return "state damaged, or of another version or configuration";
   }
   return "unknown fault";
 }

@@ -86,6 +86,16 @@ class AdaptiveBackground {
   /// Whether learn() has been called.
   [[nodiscard]] bool started() const noexcept { return started_; }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.started_);
+    for (auto* channel : {&self.y_, &self.cb_, &self.cr_}) {
+      archive(channel->mean, channel->deviation, channel->candidate);
+    }
+    archive(self.age_, self.candidate_age_, self.foreground_);
+  }
+
  private:
   struct Channel {
     ImageView<std::uint16_t> mean;       // 8.8

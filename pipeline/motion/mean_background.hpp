@@ -53,6 +53,13 @@ class MeanBackground {
   [[nodiscard]] int seen() const noexcept { return seen_; }
   [[nodiscard]] bool complete() const noexcept { return seen_ >= frames_; }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive.bounded(self.seen_, 0, self.frames_);
+    archive(self.sum_, self.mean_);
+  }
+
  private:
   int frames_ = 0;
   int seen_ = 0;

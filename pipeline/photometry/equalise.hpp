@@ -61,6 +61,12 @@ class Equalise {
     return table;
   }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.has_table_, self.table_);
+  }
+
  private:
   EqualiseMode mode_;
   bool has_table_ = false;

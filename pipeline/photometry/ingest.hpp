@@ -23,8 +23,11 @@ struct IngestPlanes {
 /// "As they are" in ITU-R BT.601 of whichever range the camera has; only full range is what kBgr8 gives.
 /// In: a picture whose size its format allows (frame.hpp). Out: planes of its size; without cb and cr, chroma that lies
 /// in rows of its own is not read. histogram: null, or how often each Y occurs, counted while the row is at hand.
+/// copy: null, or where the picture's bytes go as well, row after row without what lies between (picture_bytes()): what
+/// a recorder keeps. Each row is copied first and read from there, so that the source's memory is still read once.
 /// O(pixels), 0.1 ns a pixel, 0.4 with histogram; what bounds it is how fast the source can be read. Any thread, no
 /// state.
-void ingest_picture(const Picture& in, const IngestPlanes& out, Histogram* histogram) noexcept;
+void ingest_picture(const Picture& in, const IngestPlanes& out, Histogram* histogram,
+                    std::uint8_t* copy = nullptr) noexcept;
 
 }  // namespace stereotrack

@@ -41,6 +41,12 @@ class ConvexHull {
   /// Hulls that lost vertices for want of room, since create().
   [[nodiscard]] std::uint64_t reduced() const noexcept { return reduced_; }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.reduced_);
+  }
+
  private:
   [[nodiscard]] Hull chain(std::span<const Point> sorted) noexcept;
 

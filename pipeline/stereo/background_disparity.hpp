@@ -36,6 +36,13 @@ class BackgroundDisparity {
 
   [[nodiscard]] ImageView<const std::uint16_t> map() const noexcept { return map_; }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.map_, self.complete_);
+    archive.bounded(self.next_row_, 0, self.map_.height - 1);
+  }
+
  private:
   Config config_;
   ImageView<const std::uint8_t> shown_;

@@ -96,6 +96,12 @@ class Appearance {
     total_ = 1;
   }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.share_, self.total_);
+  }
+
  private:
   static constexpr std::array<std::uint8_t, 256> kChromaBins = [] {
     std::array<std::uint8_t, 256> bins{};

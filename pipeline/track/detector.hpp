@@ -117,6 +117,12 @@ class Detector {
   [[nodiscard]] const RejectionCounts& rejections() const noexcept { return rejections_; }
   [[nodiscard]] std::uint64_t hulls_reduced() const noexcept { return hull_.reduced(); }  ///< see ConvexHull
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.hull_);
+  }
+
  private:
   struct Layer {
     double x, y, half_width, half_height;

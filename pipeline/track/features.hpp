@@ -45,6 +45,11 @@ class Features {
     ConstantVelocityFilter<2>::Vector offset = ConstantVelocityFilter<2>::Vector::Zero();
     ConstantVelocityFilter<2>::Vector moved =
         ConstantVelocityFilter<2>::Vector::Zero();  ///< from the frame before to the latest [px]
+
+    template <class Self, class Archive>
+    static void visit_state(Self& self, Archive& archive) noexcept {
+      archive(self.filter, self.patch, self.offset, self.moved);
+    }
   };
   using Set = FixedVector<Feature, kMost>;
 

@@ -93,6 +93,12 @@ class ConstantVelocityFilter {
   /// Lets an unmeasured target slow down: velocity times `factor`, 0..1.
   void damp(double factor) noexcept { x_.template tail<D>() *= factor; }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.x_, self.P_);
+  }
+
  private:
   State x_ = State::Zero();
   Covariance P_ = Covariance::Identity();

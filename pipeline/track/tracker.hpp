@@ -100,6 +100,12 @@ class Tracker {
   /// Detections that found no room for a new target, since the start.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
+  /// What crosses frames: pipeline/core/state.hpp.
+  template <class Self, class Archive>
+  static void visit_state(Self& self, Archive& archive) noexcept {
+    archive(self.next_id_, self.refused_, self.targets_);
+  }
+
  private:
   struct Target {
     std::uint32_t id;
@@ -144,6 +150,18 @@ class Tracker {
     FixedVector<Point, 48> hull;
     std::uint16_t label;  // its detection's, 0 = none in this frame
     Features::Set features;
+
+    template <class Self, class Archive>
+    static void visit_state(Self& self, Archive& archive) noexcept {
+      archive(self.id);
+      archive.bounded(self.state, TrackState::kTentative, TrackState::kCoasting);
+      archive(self.measured, self.has_depth, self.hits, self.apart, self.whole, self.region, self.parent,
+              self.attached_frames, self.twin, self.twin_frames, self.twin_dx, self.twin_dy, self.twin_from_x,
+              self.twin_from_y, self.whole_hits, self.misses_in_a_row, self.frames, self.age_s, self.unseen_s,
+              self.depth_unseen_s, self.way_px, self.path_px, self.first_distance, self.last_x, self.last_y, self.width,
+              self.height, self.area, self.quality, self.evidence, self.first_x, self.first_y, self.appearance,
+              self.disparity_reach, self.image, self.space, self.box, self.hull, self.label, self.features);
+    }
   };
 
   [[nodiscard]] static Rect expected_box(const Target& target) noexcept;

@@ -107,6 +107,10 @@ TEST(IngestOnce, EachPageOfEachFormatIsReadOnceAndInOrder) {
       EXPECT_EQ(reads, std::vector<int>(reads.size(), 1)) << static_cast<int>(format);
       EXPECT_TRUE(source.forwards()) << static_cast<int>(format);
     });
+    std::vector<std::uint8_t> copy(row_bytes * rows);
+    const std::vector<int> reads = source.reads_during([&] { ingest_picture(picture, planes, nullptr, copy.data()); });
+    EXPECT_EQ(reads, std::vector<int>(reads.size(), 1)) << "with a copy, " << static_cast<int>(format);
+    EXPECT_TRUE(std::equal(copy.begin(), copy.end(), source.data()));
   }
 }
 
