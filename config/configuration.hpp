@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -96,6 +97,48 @@ struct TelemetryConfig {
   int multicast_ttl = 1;                  ///< hops that multicast may take
 };
 
+/// Which point of a target has to lie in a zone of the picture.
+enum class ZoneAnchor : unsigned char { kCentre, kBottom };
+
+/// [[zone]]: where a target may be. Either a box in space or a polygon in the picture. See
+/// firmware-app/signals/zone.hpp.
+struct ZoneConfig {
+  std::string name;
+  std::array<double, 2> x_m{};  ///< [m]; 0, 0: anywhere
+  std::array<double, 2> y_m{};
+  std::array<double, 2> z_m{};
+  std::vector<std::array<double, 2>> picture;  ///< corners [px]; empty: a box in space
+  ZoneAnchor anchor = ZoneAnchor::kCentre;
+};
+
+enum class SignalWhen : unsigned char {
+  kConfirmed,
+  kInZone,
+  kDistanceBelow,
+  kTimeToReachBelow,
+  kHeartbeat,
+  kDeadlineMissed,
+};
+enum class SignalMode : unsigned char { kLevel, kPulse };
+enum class ActiveLevel : unsigned char { kHigh, kLow };
+enum class SafeState : unsigned char { kInactive, kActive };
+
+/// [[signal]]: one line and its rule. See firmware-app/signals/signal_rules.hpp.
+struct SignalConfig {
+  std::string name;
+  std::string line;  ///< CHIP:LINE, see drivers/gpio/line.hpp
+  SignalWhen when = SignalWhen::kConfirmed;
+  std::string zone;        ///< name of a ZoneConfig; empty: everywhere
+  double limit_m = 0;      ///< [m]
+  double limit_s = 0;      ///< [s]
+  double period_ms = 500;  ///< of a heartbeat [ms]
+  SignalMode mode = SignalMode::kLevel;
+  double pulse_ms = 0;  ///< [ms]
+  double hold_ms = 0;   ///< [ms]
+  ActiveLevel active = ActiveLevel::kHigh;
+  SafeState safe = SafeState::kInactive;
+};
+
 /// Everything the user can say, with its defaults. Plain values: read it anywhere, once loaded it does
 /// not change. What each key does, its range and its unit stand in schema.cpp, one line a key.
 struct Configuration {
@@ -109,6 +152,8 @@ struct Configuration {
   ServiceConfig service;
   CalibrationConfig calibration;
   TelemetryConfig telemetry;
+  std::vector<ZoneConfig> zones;
+  std::vector<SignalConfig> signals;
   PipelineConfig pipeline;  ///< the stages' own Configs, see pipeline/pipeline_config.hpp
 };
 

@@ -88,6 +88,34 @@ Key key(std::string_view name, std::vector<std::string>& member, TextCheck check
   return made;
 }
 
+Key key(std::string_view name, std::vector<std::array<double, 2>>& member, std::size_t most, double min, double max,
+        std::string_view unit, std::string_view doc) {
+  Key made = detail::named(name, Kind::kPointList, unit, doc);
+  made.min = min;
+  made.max = max;
+  made.length = most;
+  made.get = [&member] {
+    std::vector<double> numbers;
+    for (const auto& point : member) numbers.insert(numbers.end(), point.begin(), point.end());
+    return Value{numbers};
+  };
+  made.set = [&member](const Value& value) {
+    const auto& numbers = std::get<std::vector<double>>(value);
+    member.clear();
+    for (std::size_t i = 0; i + 1 < numbers.size(); i += 2) member.push_back({numbers[i], numbers[i + 1]});
+  };
+  return made;
+}
+
+Key required(Key key) {
+  key.required = true;
+  return key;
+}
+
+std::string table_name(std::string_view tables, std::size_t i) {
+  return std::string(tables).append("[").append(std::to_string(i + 1)).append("]");
+}
+
 Key odd(Key key) {
   key.odd = true;
   return key;
@@ -110,10 +138,18 @@ std::string refusal(const Key& key, const Value& value) {
         if (!wrong.empty()) return wrong;
       }
       return {};
-    case Kind::kNumberList: {
+    case Kind::kTables: {
+      if (std::get<double>(value) <= key.max) return {};
+      return "there may be " + number_text(key.max, true) + ": leave one out";
+    }
+    case Kind::kNumberList:
+    case Kind::kPointList: {
       const auto& numbers = std::get<std::vector<double>>(value);
-      if (numbers.size() != key.length) {
+      if (key.kind == Kind::kNumberList && numbers.size() != key.length) {
         return std::to_string(numbers.size()) + " numbers given: give " + std::to_string(key.length);
+      }
+      if (key.kind == Kind::kPointList && numbers.size() > 2 * key.length) {
+        return std::to_string(numbers.size() / 2) + " points given: give at most " + std::to_string(key.length);
       }
       for (const double number : numbers) {
         std::string wrong = number_refusal(key, number);
@@ -134,6 +170,8 @@ std::string expectation(const Key& key) {
     case Kind::kChoice: return "one of " + choice_list(key);
     case Kind::kTextList: return "a list of texts such as [\"a\", \"b\"]";
     case Kind::kNumberList: return "a list of " + std::to_string(key.length) + " numbers such as " + value_text(key);
+    case Kind::kPointList: return "a list of points such as [[0, 0], [100, 0], [100, 480]]";
+    case Kind::kTables: return "a list of tables, [[" + key.name + "]] and its keys below each,";
   }
   return {};
 }
@@ -142,7 +180,8 @@ std::string range_text(const Key& key) {
   switch (key.kind) {
     case Kind::kInteger:
     case Kind::kNumber:
-    case Kind::kNumberList: {
+    case Kind::kNumberList:
+    case Kind::kPointList: {
       const bool integer = key.kind == Kind::kInteger;
       const auto bound = [integer](double value) {
         return integer || value == std::floor(value) ? number_text(value, true) : shortest(value);
@@ -153,10 +192,36 @@ std::string range_text(const Key& key) {
     case Kind::kChoice: return "one of " + choice_list(key);
     case Kind::kSwitch:
     case Kind::kText:
-    case Kind::kTextList: return {};
+    case Kind::kTextList:
+    case Kind::kTables: return {};
   }
   return {};
 }
+
+namespace {
+
+/// All on one line.
+std::string tables_text(const Key& key, std::size_t count) {
+  std::string all;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::string table;
+    for (const Key& each : key.keys(i)) {
+      table += (table.empty() ? "" : ", ") + each.name.substr(each.name.rfind('.') + 1) + " = " + value_text(each);
+    }
+    all += (i == 0 ? "{" : ", {") + table + "}";
+  }
+  return "[" + all + "]";
+}
+
+std::string points_text(const std::vector<double>& numbers) {
+  std::string all;
+  for (std::size_t i = 0; i + 1 < numbers.size(); i += 2) {
+    all += (i == 0 ? "[" : ", [") + number_text(numbers[i], false) + ", " + number_text(numbers[i + 1], false) + "]";
+  }
+  return "[" + all + "]";
+}
+
+}  // namespace
 
 std::string value_text(const Key& key) {
   const Value value = key.get();
@@ -174,6 +239,8 @@ std::string value_text(const Key& key) {
     case Kind::kTextList: return list(std::get<std::vector<std::string>>(value), quoted);
     case Kind::kNumberList:
       return list(std::get<std::vector<double>>(value), [](double number) { return number_text(number, false); });
+    case Kind::kPointList: return points_text(std::get<std::vector<double>>(value));
+    case Kind::kTables: return tables_text(key, static_cast<std::size_t>(std::get<double>(value)));
   }
   return {};
 }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <initializer_list>
 #include <limits>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -19,7 +20,17 @@ namespace stereotrack::config {
 /// A value on its way between TOML text and a member. Integers travel as double: exact to 2^53.
 using Value = std::variant<bool, double, std::string, std::vector<std::string>, std::vector<double>>;
 
-enum class Kind : unsigned char { kSwitch, kInteger, kNumber, kText, kChoice, kTextList, kNumberList };
+enum class Kind : unsigned char {
+  kSwitch,
+  kInteger,
+  kNumber,
+  kText,
+  kChoice,
+  kTextList,
+  kNumberList,
+  kPointList,  ///< as a Value: x and y in turns
+  kTables,     ///< as a Value: how many there are; those that set() adds have their defaults
+};
 
 /// Says what is wrong with a text and the way out; empty if nothing is.
 using TextCheck = std::string (*)(std::string_view);
@@ -31,15 +42,23 @@ struct Key {
   Kind kind = Kind::kSwitch;
   std::string doc;   ///< one sentence: what the value does to the result
   std::string unit;  ///< empty: none
-  double min = 0;    ///< kInteger, kNumber, kNumberList
+  double min = 0;    ///< kInteger, kNumber, kNumberList, kPointList; kTables: of their number
   double max = 0;
   bool odd = false;                  ///< kInteger: even values are refused
-  std::size_t length = 0;            ///< kNumberList: exactly so many
+  bool required = false;             ///< in a table of kTables: it has to be given
+  std::size_t length = 0;            ///< kNumberList: exactly so many; kPointList: at most
   std::vector<std::string> choices;  ///< kChoice
   TextCheck check = nullptr;         ///< kText, and each element of kTextList
   std::function<Value()> get;
   std::function<void(const Value&)> set;
+  /// kTables: the keys of table i, from 0, bound to it until set(). Their names begin with table_name().
+  std::function<std::vector<Key>(std::size_t i)> keys;
+  /// kTables: the keys of one that shows how it is written.
+  std::function<std::vector<Key>()> example;
 };
+
+/// "signal[1]", the first of them. Its keys are signal[1].name and so on.
+[[nodiscard]] std::string table_name(std::string_view tables, std::size_t i);
 
 /// What is wrong with a value of the right type (range, choice, finiteness, length) and the way out;
 /// empty if nothing is.
@@ -115,6 +134,30 @@ requires std::floating_point<T>
   };
   return made;
 }
+
+/// Points of a picture, at most `most`.
+[[nodiscard]] Key key(std::string_view name, std::vector<std::array<double, 2>>& member, std::size_t most, double min,
+                      double max, std::string_view unit, std::string_view doc);
+
+/// A list of tables, [[name]] each, at most `most`. `keys` binds the keys of one, by their names in it.
+template <class T>
+[[nodiscard]] Key tables(std::string_view name, std::vector<T>& member, std::size_t most, std::vector<Key> (*keys)(T&),
+                         const T& example, std::string_view doc) {
+  Key made = detail::named(name, Kind::kTables, "", doc);
+  made.max = static_cast<double>(most);
+  made.get = [&member] { return Value{static_cast<double>(member.size())}; };
+  made.set = [&member](const Value& value) { member.resize(static_cast<std::size_t>(std::get<double>(value))); };
+  made.keys = [&member, keys, list = made.name](std::size_t i) {
+    std::vector<Key> bound = keys(member[i]);
+    for (Key& each : bound) each.name = table_name(list, i) + "." + each.name;
+    return bound;
+  };
+  made.example = [keys, shown = std::make_shared<T>(example)] { return keys(*shown); };
+  return made;
+}
+
+/// The same key, which each table of its list has to give.
+[[nodiscard]] Key required(Key key);
 
 /// The same key, for windows that have a middle: takes odd integers only.
 [[nodiscard]] Key odd(Key key);

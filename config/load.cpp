@@ -41,7 +41,7 @@ struct Problem {
 std::string printable(std::string_view name) {
   const bool bare = std::all_of(name.begin(), name.end(), [](char letter) {
     return (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z') || (letter >= '0' && letter <= '9') ||
-           letter == '_' || letter == '-' || letter == '.';
+           letter == '_' || letter == '-' || letter == '.' || letter == '[' || letter == ']';
   });
   return bare && !name.empty() ? std::string(name) : quoted(name);
 }
@@ -137,6 +137,23 @@ std::optional<Value> list_of(const toml::node& node, const Read& read) {
   return Value{elements};
 }
 
+/// A list of lists of two numbers.
+std::optional<Value> points_of(const toml::node& node) {
+  const toml::array* array = node.as_array();
+  if (array == nullptr) return std::nullopt;
+  std::vector<double> numbers;
+  for (const toml::node& item : *array) {
+    const toml::array* point = item.as_array();
+    if (point == nullptr || point->size() != 2) return std::nullopt;
+    for (const toml::node& coordinate : *point) {
+      const std::optional<double> number = number_of(coordinate);
+      if (!number) return std::nullopt;
+      numbers.push_back(*number);
+    }
+  }
+  return Value{numbers};
+}
+
 /// The node's value if it has the key's type.
 std::optional<Value> value_of(const Key& key, const toml::node& node) {
   const auto text_of = [](const toml::node& item) -> std::optional<std::string> {
@@ -159,6 +176,8 @@ std::optional<Value> value_of(const Key& key, const toml::node& node) {
       return std::nullopt;
     case Kind::kTextList: return list_of<std::string>(node, text_of);
     case Kind::kNumberList: return list_of<double>(node, number_of);
+    case Kind::kPointList: return points_of(node);
+    case Kind::kTables: return std::nullopt;  // Walker's business
   }
   return std::nullopt;
 }
@@ -167,7 +186,7 @@ std::optional<Value> value_of(const Key& key, const toml::node& node) {
 std::string assign(const Key& key, const toml::node& node) {
   const std::optional<Value> value = value_of(key, node);
   if (!value) {
-    const bool list = key.kind == Kind::kTextList || key.kind == Kind::kNumberList;
+    const bool list = key.kind == Kind::kTextList || key.kind == Kind::kNumberList || key.kind == Kind::kPointList;
     return key.name + ": " + expectation(key) + " is expected, not " +
            (list && node.is_array() ? "another list" : type_name(node));
   }
@@ -193,7 +212,10 @@ class Walker {
         continue;
       }
       const bool section = std::find(sections_.begin(), sections_.end(), path) != sections_.end();
-      if (const Key* key = find(keys_, path)) {
+      const Key* key = find(keys_, path);
+      if (key != nullptr && key->kind == Kind::kTables) {
+        walk_tables(*key, node);
+      } else if (key != nullptr) {
         const Position value_at = position_of(node.source());
         std::string wrong = assign(*key, node);
         if (!wrong.empty()) problems_.push_back({value_at, std::move(wrong)});
@@ -219,6 +241,42 @@ class Walker {
   }
 
  private:
+  /// The list of this layer in place of that of the layers before.
+  void walk_tables(const Key& list, const toml::node& node) {
+    std::erase_if(origins_, [&](const auto& origin) { return origin.first.starts_with(list.name + "["); });
+    origins_.insert_or_assign(list.name, place(position_of(node.source())));
+    list.set(Value{0.0});
+    const toml::array* tables = node.as_array();
+    const bool good = tables != nullptr && std::all_of(tables->begin(), tables->end(),
+                                                       [](const toml::node& item) { return item.is_table(); });
+    if (!good) {
+      problems_.push_back({position_of(node.source()), list.name + ": " + expectation(list) + " is expected, not " +
+                                                           (tables != nullptr ? "another list" : type_name(node))});
+      return;
+    }
+    for (std::size_t i = 0; i < tables->size(); ++i) {
+      const toml::node& item = *tables->get(i);
+      const Position at = position_of(item.source());
+      const Value count{static_cast<double>(i + 1)};
+      std::string wrong = refusal(list, count);
+      if (!wrong.empty()) {
+        problems_.push_back({at, list.name + ": " + std::move(wrong)});
+        return;
+      }
+      list.set(count);
+      const std::string name = table_name(list.name, i);
+      origins_.insert_or_assign(name, place(at));
+      const std::vector<Key> keys = list.keys(i);
+      Walker inner(layer_, keys, origins_);
+      inner.walk(*item.as_table(), name + ".");
+      for (const Key& key : keys) {
+        if (!key.required || origins_.contains(key.name)) continue;
+        inner.problems_.push_back({at, key.name + ": it is missing: give " + expectation(key)});
+      }
+      problems_.insert(problems_.end(), inner.problems_.begin(), inner.problems_.end());
+    }
+  }
+
   [[nodiscard]] std::string place(Position at) const {
     return layer_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column);
   }
@@ -286,6 +344,11 @@ void apply_override(const Layer& layer, std::span<const Key> keys, Origins& orig
   const auto [name, text] = split(layer);
   const std::string place = "--set " + name + "=" + (text.empty() ? "" : printable(text));
   const Key* key = find(keys, name);
+  const Key* list = find(keys, name.substr(0, name.find_first_of(".[")));
+  if (list != nullptr && list->kind == Kind::kTables) {
+    throw Error("--set " + printable(name) + ": " + list->name + " is a list of tables: write [[" + list->name +
+                "]] into a file and give it to --config");
+  }
   if (key == nullptr) {
     const std::vector<std::string> sections = sections_of(keys);
     if (std::find(sections.begin(), sections.end(), name) != sections.end()) {

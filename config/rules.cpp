@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "config/schema.hpp"
+#include "config/signals.hpp"
 #include "pipeline/effort.hpp"
 
 namespace stereotrack::config {
@@ -65,6 +66,13 @@ bool said_by_user(const Loaded& loaded, std::string_view key) {
   return origin != loaded.origins.end() && !origin->second.starts_with("config/presets/");
 }
 
+bool is_zero(const Value& value) {
+  if (const auto* numbers = std::get_if<std::vector<double>>(&value)) {
+    return std::all_of(numbers->begin(), numbers->end(), [](double number) { return number == 0; });
+  }
+  return std::get<double>(value) == 0;
+}
+
 }  // namespace
 
 std::span<const Rule> rules() {
@@ -95,6 +103,7 @@ void check_rules(const Loaded& loaded) {
     }
     throw error_at(loaded.origins, blamed, what);
   }
+  check_signals(loaded);
 }
 
 void check_metres(const Loaded& loaded, double unit_m) {
@@ -105,8 +114,10 @@ void check_metres(const Loaded& loaded, double unit_m) {
 void check_metres(std::span<const Key> keys, const Origins& origins, double unit_m) {
   if (unit_m > 0) return;
   for (const Key& key : keys) {
+    const std::size_t tables = key.kind == Kind::kTables ? static_cast<std::size_t>(std::get<double>(key.get())) : 0;
+    for (std::size_t i = 0; i < tables; ++i) check_metres(key.keys(i), origins, unit_m);
     const bool metres = key.unit == "m" || key.unit.starts_with("m/");
-    if (!metres || std::get<double>(key.get()) == 0) continue;
+    if (!metres || is_zero(key.get())) continue;
     throw error_at(origins, key.name,
                    "it is in metres, and the calibration's unit is not known: set calibration.unit_m to the metres in "
                    "one unit of T");

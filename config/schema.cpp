@@ -1,9 +1,11 @@
 #include "config/schema.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include "config/presets.hpp"
+#include "config/signals.hpp"
 
 namespace stereotrack::config {
 namespace {
@@ -114,6 +116,9 @@ std::vector<Key> keys_of(Configuration& c) {
           "signed. Replays never are."),
       key("telemetry.multicast_ttl", c.telemetry.multicast_ttl, 1, 255, "hops",
           "How many networks a datagram to a multicast address may cross; 1: it stays in the local one."),
+
+      zones_key(c.zones),
+      signals_key(c.signals),
 
       key("equalise.mode", p.equalise,
           {{"off", EqualiseMode::kOff}, {"frame", EqualiseMode::kFrame}, {"frozen", EqualiseMode::kFrozen}},
@@ -255,6 +260,8 @@ std::vector<Key> keys_of(Configuration& c) {
 
 namespace {
 
+bool is_list(const Key& key) { return key.kind == Kind::kTables; }
+
 std::string section_of(const Key& key) {
   const std::size_t dot = key.name.rfind('.');
   return dot == std::string::npos ? std::string() : key.name.substr(0, dot);
@@ -285,6 +292,15 @@ std::string wrapped_comment(std::string_view text) {
   return out + "# " + std::string(text) + "\n";
 }
 
+/// The key with its meaning above it.
+std::string documented(const Key& key, std::string_view before) {
+  const std::string range = range_text(key);
+  const std::string limits = range.empty() ? "" : std::string(" Range: ").append(range).append(".");
+  std::string text("\n");
+  text.append(wrapped_comment(key.doc + limits));
+  return text.append(before).append(leaf_of(key)).append(" = ").append(value_text(key)).append("\n");
+}
+
 }  // namespace
 
 std::string to_text(const Configuration& configuration) {
@@ -294,7 +310,17 @@ std::string to_text(const Configuration& configuration) {
   for (const std::string& section : sections_of(keys)) {
     if (!section.empty()) text.append("\n[").append(section).append("]\n");
     for (const Key& key : keys) {
-      if (section_of(key) == section) text.append(leaf_of(key)).append(" = ").append(value_text(key)).append("\n");
+      if (section_of(key) != section || is_list(key)) continue;
+      text.append(leaf_of(key)).append(" = ").append(value_text(key)).append("\n");
+    }
+  }
+  for (const Key& list : keys) {
+    if (!is_list(list)) continue;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(std::get<double>(list.get())); ++i) {
+      text.append("\n[[").append(list.name).append("]]\n");
+      for (const Key& key : list.keys(i)) {
+        text.append(leaf_of(key)).append(" = ").append(value_text(key)).append("\n");
+      }
     }
   }
   return text;
@@ -309,16 +335,20 @@ std::string sample_text() {
       "#     cmake --build build/release --target update_sample_config\n"
       "# What a file says wins over the preset, and --set KEY=VALUE wins over the file. So start your own\n"
       "# file empty and copy only the lines that you change: a full copy of this one hides the preset.\n"
-      "# Paths of keys are dotted, [source] and fps = 30.0 is the same as source.fps = 30.0.\n";
+      "# Paths of keys are dotted, [source] and fps = 30.0 is the same as source.fps = 30.0.\n"
+      "# Lists of tables, [[zone]] and [[signal]], are empty by default: at the end there is one of each, in "
+      "comments.\n";
   for (const std::string& section : sections_of(keys)) {
     if (!section.empty()) text.append("\n[").append(section).append("]\n");
     for (const Key& key : keys) {
-      if (section_of(key) != section) continue;
-      const std::string range = range_text(key);
-      const std::string limits = range.empty() ? "" : std::string(" Range: ").append(range).append(".");
-      text.append("\n").append(wrapped_comment(key.doc + limits));
-      text.append(leaf_of(key)).append(" = ").append(value_text(key)).append("\n");
+      if (section_of(key) == section && !is_list(key)) text += documented(key, "");
     }
+  }
+  for (const Key& list : keys) {
+    if (!is_list(list)) continue;
+    text.append("\n").append(wrapped_comment(list.doc + " At most " + std::to_string(std::lround(list.max)) + "."));
+    text.append("#[[").append(list.name).append("]]\n");
+    for (const Key& key : list.example()) text += documented(key, "#");
   }
   return text;
 }

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,14 @@ void change(const Key& key) {
           Value{std::get<std::string>(key.get()) == key.choices.front() ? key.choices.back() : key.choices.front()});
       break;
     case Kind::kTextList: key.set(Value{std::vector<std::string>{"10.0.0.1:9000", "h:1"}}); break;
+    case Kind::kPointList: key.set(Value{std::vector<double>{key.min, 0, key.max, 1}}); break;
+    case Kind::kTables: {
+      key.set(Value{1.0});
+      const std::vector<Key> keys = key.keys(0);
+      const std::vector<Key> example = key.example();
+      for (std::size_t i = 0; i < keys.size(); ++i) keys[i].set(example[i].get());
+      break;
+    }
     case Kind::kNumberList: key.set(Value{std::vector<double>(key.length, key.max)}); break;
   }
 }
@@ -45,8 +54,76 @@ TEST(Schema, SampleGivesTheDefaultsAndSetsEveryKey) {
   EXPECT_EQ(to_text(loaded.configuration), to_text(Configuration{}));
   Configuration configuration;
   for (const Key& key : keys_of(configuration)) {
+    if (key.kind == Kind::kTables) continue;  // empty by default; see the next test
     ASSERT_TRUE(loaded.origins.contains(key.name)) << key.name;
     EXPECT_EQ(loaded.origins.at(key.name).find("sample:"), 0U) << key.name;
+  }
+}
+
+TEST(Schema, TablesInTheSampleAreRightWithoutTheirCommentSigns) {
+  std::istringstream lines(sample_text());
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    const bool code = line.size() > 1 && line[0] == '#' && line[1] != ' ';
+    text += (code ? line.substr(1) : line) + "\n";
+  }
+  Loaded loaded = load(Layers{text_layer("sample", text)});
+  for (const Key& list : keys_of(loaded.configuration)) {
+    if (list.kind != Kind::kTables) continue;
+    EXPECT_EQ(list.get(), Value{1.0}) << list.name;
+    const std::vector<Key> keys = list.keys(0);
+    const std::vector<Key> example = list.example();
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      EXPECT_TRUE(loaded.origins.contains(keys[i].name)) << keys[i].name;
+      EXPECT_EQ(value_text(keys[i]), value_text(example[i])) << keys[i].name;
+    }
+  }
+}
+
+TEST(Schema, EveryKeyOfATableSurvivesTheRoundTripThroughText) {
+  Configuration reference;
+  for (std::size_t list = 0; list < keys_of(reference).size(); ++list) {
+    if (keys_of(reference)[list].kind != Kind::kTables) continue;
+    const std::size_t count = keys_of(reference)[list].example().size();
+    for (std::size_t i = 0; i < count; ++i) {
+      Configuration changed;
+      const std::vector<Key> all = keys_of(changed);
+      change(all[list]);
+      const std::string before = to_text(changed);
+      const std::vector<Key> keys = all[list].keys(0);
+      if (keys[i].name == "signal[1].line") {
+        keys[i].set(Value{std::string("a:b")});
+      } else {
+        change(keys[i]);
+      }
+      const std::string text = to_text(changed);
+      EXPECT_NE(text, before) << keys[i].name;
+      Configuration read;
+      Origins origins;
+      apply(text_layer("t", text), keys_of(read), origins);
+      EXPECT_EQ(to_text(read), text) << keys[i].name;
+      EXPECT_EQ(value_text(keys_of(read)[list]), value_text(all[list])) << "on one line, for comparison";
+    }
+  }
+}
+
+TEST(Schema, KeysOfATableWriteDifferentMembers) {
+  Configuration reference;
+  for (std::size_t list = 0; list < keys_of(reference).size(); ++list) {
+    if (keys_of(reference)[list].kind != Kind::kTables) continue;
+    keys_of(reference)[list].set(Value{1.0});
+    const std::vector<Key> unchanged = keys_of(reference)[list].keys(0);
+    for (std::size_t i = 0; i < unchanged.size(); ++i) {
+      Configuration configuration;
+      keys_of(configuration)[list].set(Value{1.0});
+      const std::vector<Key> keys = keys_of(configuration)[list].keys(0);
+      change(keys[i]);
+      for (std::size_t j = 0; j < keys.size(); ++j) {
+        EXPECT_EQ(value_text(keys[j]) == value_text(unchanged[j]), i != j) << keys[i].name << " and " << keys[j].name;
+      }
+      EXPECT_FALSE(keys[i].doc.empty());
+      EXPECT_EQ(keys[i].doc.back(), '.') << keys[i].name;
+    }
   }
 }
 

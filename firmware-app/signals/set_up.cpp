@@ -1,0 +1,100 @@
+#include "firmware-app/signals/set_up.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "config/error.hpp"
+#include "config/signals.hpp"
+
+namespace stereotrack::signals {
+namespace {
+
+static_assert(config::kMaxSignals == kMaxSignals && config::kMaxZones == kMaxZones &&
+              config::kMaxCorners == Zone::kMaxCorners);
+
+constexpr double kAnywhere_m = 1e6;
+
+[[nodiscard]] std::chrono::nanoseconds from_ms(double ms) { return std::chrono::nanoseconds(std::llround(ms * 1e6)); }
+
+[[nodiscard]] Zone::Range range_of(const std::array<double, 2>& said) {
+  const bool anywhere = said[0] == 0 && said[1] == 0;
+  return anywhere ? Zone::Range{-kAnywhere_m, kAnywhere_m} : Zone::Range{said[0], said[1]};
+}
+
+[[nodiscard]] Condition condition_of(config::SignalWhen when) {
+  switch (when) {
+    case config::SignalWhen::kConfirmed: return Condition::kConfirmed;
+    case config::SignalWhen::kInZone: return Condition::kInZone;
+    case config::SignalWhen::kDistanceBelow: return Condition::kDistanceBelow;
+    case config::SignalWhen::kTimeToReachBelow: return Condition::kTimeToReachBelow;
+    case config::SignalWhen::kHeartbeat: return Condition::kHeartbeat;
+    case config::SignalWhen::kDeadlineMissed: return Condition::kDeadlineMissed;
+  }
+  return Condition::kConfirmed;
+}
+
+[[nodiscard]] Zone zone_of(const config::ZoneConfig& said) {
+  Zone zone;
+  zone.kind = said.picture.empty() ? Zone::Kind::kSpace : Zone::Kind::kPicture;
+  zone.x_m = range_of(said.x_m);
+  zone.y_m = range_of(said.y_m);
+  zone.z_m = range_of(said.z_m);
+  for (const auto& [x, y] : said.picture) (void)zone.corners.push({x, y});
+  zone.anchor = said.anchor == config::ZoneAnchor::kBottom ? Zone::Anchor::kBottom : Zone::Anchor::kCentre;
+  return zone;
+}
+
+[[nodiscard]] Signal signal_of(const config::SignalConfig& said, const std::vector<config::ZoneConfig>& zones) {
+  Signal signal;
+  signal.when = condition_of(said.when);
+  if (!said.zone.empty()) {
+    const auto zone = std::find_if(zones.begin(), zones.end(),
+                                   [&](const config::ZoneConfig& each) { return each.name == said.zone; });
+    signal.zone = static_cast<std::size_t>(zone - zones.begin());  // one that is not there is refused by the rules
+  }
+  signal.limit_m = said.limit_m;
+  signal.limit_s = said.limit_s;
+  signal.mode = said.mode == config::SignalMode::kPulse ? Signal::Mode::kPulse : Signal::Mode::kLevel;
+  signal.pulse = from_ms(said.pulse_ms);
+  signal.hold = from_ms(said.hold_ms);
+  signal.half_period = from_ms(said.period_ms) / 2;
+  signal.safe = said.safe == config::SafeState::kActive;
+  return signal;
+}
+
+}  // namespace
+
+std::vector<gpio::LineSpec> line_specs(const config::Configuration& configuration) {
+  std::vector<gpio::LineSpec> specs;
+  for (const config::SignalConfig& said : configuration.signals) {
+    try {
+      specs.push_back({.name = gpio::parse_line_name(said.line),
+                       .active_low = said.active == config::ActiveLevel::kLow,
+                       .safe = said.safe == config::SafeState::kActive});
+    } catch (const std::runtime_error& error) {
+      throw config::Error("signal " + said.name + ": " + error.what());
+    }
+  }
+  return specs;
+}
+
+SignalRules make_rules(const config::Configuration& configuration, double unit_m,
+                       std::chrono::nanoseconds stale_after) {
+  SignalRules::Config config;
+  config.unit_m = unit_m;
+  config.stale_after = stale_after;
+  for (const config::ZoneConfig& said : configuration.zones) (void)config.zones.push(zone_of(said));
+  for (const config::SignalConfig& said : configuration.signals) {
+    (void)config.signals.push(signal_of(said, configuration.zones));
+  }
+  auto rules = SignalRules::create(config);
+  if (!rules.has_value()) {
+    throw config::Error("zones and signals: " + std::string(to_string(rules.error())) +
+                        ": give calibration.unit_m if they are in metres, or see docs/SIGNALS.md");
+  }
+  return *rules;
+}
+
+}  // namespace stereotrack::signals
