@@ -139,6 +139,21 @@ struct SignalConfig {
   SafeState safe = SafeState::kInactive;
 };
 
+/// The black box and what it writes: docs/RECORDING.md.
+struct RecordConfig {
+  bool on = false;
+  double seconds = 10;       ///< kept before a trigger [s]
+  double seconds_after = 2;  ///< and after it [s]
+  int reduce = 1;            ///< pictures so many times smaller; over 1: luma alone, replays are not exact
+  int every = 1;             ///< every n-th frame; over 1: replays are not exact
+  std::string directory = "/var/lib/stereotrack/recordings";
+  int max_mb = 2000;        ///< of all recordings in it [MB = 2^20 bytes]
+  bool on_deadline = true;  ///< triggers
+  bool on_zone = false;
+  bool on_signal = true;
+  bool on_input = false;
+};
+
 /// Everything the user can say, with its defaults. Plain values: read it anywhere, once loaded it does
 /// not change. What each key does, its range and its unit stand in schema.cpp, one line a key.
 struct Configuration {
@@ -154,6 +169,7 @@ struct Configuration {
   TelemetryConfig telemetry;
   std::vector<ZoneConfig> zones;
   std::vector<SignalConfig> signals;
+  RecordConfig record;
   PipelineConfig pipeline;  ///< the stages' own Configs, see pipeline/pipeline_config.hpp
 };
 

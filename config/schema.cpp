@@ -120,6 +120,25 @@ std::vector<Key> keys_of(Configuration& c) {
       zones_key(c.zones),
       signals_key(c.signals),
 
+      key("record.on", c.record.on,
+          "Keeps the last seconds in memory and writes them to a recording when something happens."),
+      key("record.seconds", c.record.seconds, 0.1, 600, "s",
+          "Time before it that a recording has: at least half of it is replayed exactly. Costs memory: each frame its "
+          "pictures' bytes."),
+      key("record.seconds_after", c.record.seconds_after, 0, 600, "s", "Time after it that a recording has."),
+      key("record.reduce", c.record.reduce, 1, 4, "",
+          "Recorded pictures are so many times smaller along rows and columns: over 1 they hold luma alone, and a "
+          "replay is not the run's to the byte any more."),
+      key("record.every", c.record.every, 1, 100, "frames",
+          "Every n-th frame is recorded: over 1, a replay is not the run's to the byte any more."),
+      key("record.directory", c.record.directory, nullptr, "Folder for recordings, on a disk that bears the writing."),
+      key("record.max_mb", c.record.max_mb, 1, 1000000, "MB",
+          "All recordings in it together: where there are more, the oldest are deleted."),
+      key("record.on_deadline", c.record.on_deadline, "Records when a result was not there in time."),
+      key("record.on_zone", c.record.on_zone, "Records when a target comes into a zone."),
+      key("record.on_signal", c.record.on_signal, "Records when the service is sent SIGUSR1."),
+      key("record.on_input", c.record.on_input, "Records when the GPIO input says so."),
+
       key("equalise.mode", p.equalise,
           {{"off", EqualiseMode::kOff}, {"frame", EqualiseMode::kFrame}, {"frozen", EqualiseMode::kFrozen}},
           "Histogram equalisation (3.2-3.5): frame by frame makes the background flicker, frozen keeps the first "

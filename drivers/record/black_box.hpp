@@ -59,12 +59,12 @@ class BlackBox {
   static constexpr int kKeyframes = 3;
 
   struct Config {
-    double seconds = 10;              ///< before a trigger, 0.1..600
-    double seconds_after = 2;         ///< after it, 0..600
-    int reduce = 1;                   ///< 1, 2, 4
-    int every = 1;                    ///< 1..100
-    std::filesystem::path directory;  ///< must exist; the recordings' names begin with kPrefix
-    std::uint64_t max_bytes = 0;      ///< of all recordings in it; the oldest go, where there are more
+    double seconds = 10;                ///< before a trigger, 0.1..600
+    double seconds_after = 2;           ///< after it, 0..600
+    int reduce = 1;                     ///< 1, 2, 4
+    int every = 1;                      ///< 1..100
+    std::filesystem::path directory{};  ///< must exist; the recordings' names begin with kPrefix
+    std::uint64_t max_bytes = 0;        ///< of all recordings in it; the oldest go, where there are more
     std::uint64_t spare_bytes = std::uint64_t{64} << 20U;  ///< stay free on the disk
   };
   static constexpr const char* kPrefix = "stereotrack-";

@@ -89,6 +89,7 @@ void RecordingSource::index() {
   FileRecord record;
   bool whole = false;
   bool keyframe_damaged = false;
+  int outputs_damaged = 0;
   std::uint32_t number = 0;
   while (!whole && read_record(at, record)) {
     if (record.header.number != ++number) break;
@@ -106,6 +107,8 @@ void RecordingSource::index() {
         if (record.payload.size() == sizeof(OutputNote) && checksum(record.payload) == record.header.sum) {
           const auto note = value_at<OutputNote>(record.payload);
           outputs_[note.ordinal] = note;
+        } else {
+          ++outputs_damaged;
         }
         break;
       case RecordKind::kEnd:
@@ -128,7 +131,9 @@ void RecordingSource::index() {
     warning_ = path_ + ": cut or damaged after byte " + std::to_string(at) + " of " + std::to_string(file_.size()) +
                ": read up to frame " + std::to_string(last) + " (" + std::to_string(frames_.size()) + " frames)";
   } else if (keyframe_damaged) {
-    warning_ = path_ + ": its keyframe is damaged: tracks begin anew";
+    warning_ = path_ + ": its keyframe is damaged";
+  } else if (outputs_damaged > 0) {
+    warning_ = path_ + ": " + std::to_string(outputs_damaged) + " of its messages are damaged and left out";
   }
   info_.name = path_;
   info_.width = about_.width;

@@ -160,10 +160,8 @@ TEST(Recording, NoFlippedByteGetsThroughUnnoticed) {
     put(path, bytes);
     try {
       RecordingSource source(path);
-      const bool keyframe = !source.keyframe().empty();
-      const bool outputs = source.output_of(12) != nullptr && source.output_of(13) != nullptr;
       const int frames = frames_of(source);
-      EXPECT_TRUE(!source.warning().empty() || !keyframe || !outputs || frames < 4) << "byte " << at;
+      EXPECT_TRUE(!source.warning().empty() || frames < 4) << "byte " << at;
     } catch (const std::runtime_error&) {
     }
     bytes[at] = static_cast<char>(bytes[at] ^ 0x10);
