@@ -336,6 +336,18 @@ void append_target_row(std::string& text, const Target& t, float scale) {
   append(text, " %11.2f", static_cast<double>(t.confidence));
 }
 
+/// "7 (3 forged, 4 replayed)".
+std::string refused_text(const Receiver& receiver) {
+  const telemetry::ReceiverCounters& c = receiver.counters();
+  std::string reasons;
+  for (std::size_t i = 0; i < c.refused.size(); ++i) {
+    if (c.refused[i] == 0) continue;
+    reasons += (reasons.empty() ? "" : ", ") + std::to_string(c.refused[i]) + ' ' +
+               to_string(static_cast<telemetry::Refusal>(i));
+  }
+  return std::to_string(c.refused_total()) + (reasons.empty() ? "" : " (" + reasons + ")");
+}
+
 class Screen {
  public:
   explicit Screen(std::ostream& out) : out_(out) {}
@@ -345,15 +357,17 @@ class Screen {
             Clock::time_point now) {
     std::string text;
     lines_left_ = height() - 1;
-    line(text, "stereotrack monitor on " + where + ", ctrl-C ends");
+    const bool refused = receiver.counters().refused_total() > 0;
+    line(text, "stereotrack monitor on " + where + ", ctrl-C ends" +
+                   (refused ? "  refused " + refused_text(receiver) : std::string()));
     if (rigs.empty()) line(text, "nothing received yet");
     for (auto& [rig, view] : rigs) {
       const Header& h = view.pair.header;
       const Unit unit(h);
       std::string head;
-      append(head, "rig %u  session %ju  pair %ju  %.1f pairs/s  latency %.1f ms  lost %ju  refused %ju  flags ", rig,
+      append(head, "rig %u  session %ju  pair %ju  %.1f pairs/s  latency %.1f ms  lost %ju  flags ", rig,
              std::uintmax_t{h.session}, std::uintmax_t{h.ordinal}, view.rate(now), h.latency_ns * 1e-6,
-             std::uintmax_t{view.lost}, std::uintmax_t{receiver.counters().refused_total()});
+             std::uintmax_t{view.lost});
       line(text, head + flag_names(h.flags));
       if (view.pair.live) line(text, "  " + live_text(*view.pair.live));
       if (view.status) {
@@ -425,19 +439,11 @@ std::string plain_line(const Datagram& with_status) {
 
 std::string summary_line(const Receiver& receiver) {
   const telemetry::ReceiverCounters& c = receiver.counters();
-  std::string text = "received " + std::to_string(c.pairs) + " pairs" +
-                     (c.statuses > 0 ? " and " + std::to_string(c.statuses) + " statuses" : std::string()) + " in " +
-                     std::to_string(c.datagrams) + " datagrams, lost " + std::to_string(receiver.lost()) +
-                     ", refused " + std::to_string(c.refused_total());
-  std::string reasons;
-  for (std::size_t i = 0; i < c.refused.size(); ++i) {
-    if (c.refused[i] == 0) continue;
-    reasons += (reasons.empty() ? "" : ", ") + std::to_string(c.refused[i]) + ' ' +
-               to_string(static_cast<telemetry::Refusal>(i));
-  }
-  if (!reasons.empty()) text += " (" + reasons + ")";
-  return text + ", duplicates " + std::to_string(c.duplicates) + ", reordered " + std::to_string(c.reordered) +
-         ", too late " + std::to_string(c.stale) + '\n';
+  return "received " + std::to_string(c.pairs) + " pairs" +
+         (c.statuses > 0 ? " and " + std::to_string(c.statuses) + " statuses" : std::string()) + " in " +
+         std::to_string(c.datagrams) + " datagrams, lost " + std::to_string(receiver.lost()) + ", refused " +
+         refused_text(receiver) + ", duplicates " + std::to_string(c.duplicates) + ", reordered " +
+         std::to_string(c.reordered) + ", too late " + std::to_string(c.stale) + '\n';
 }
 
 /// Keeps the receiver's marks in a file.
@@ -552,8 +558,12 @@ int run_monitor(const MonitorArguments& arguments, std::ostream& out, std::ostre
   messages << trouble << std::flush;
   if (!timed_out) return trouble.empty() ? 0 : 1;
   std::string line;
-  append(line, "nothing valid received on %s for %g s: is a sender running, and does it send to this address?\n",
-         where.c_str(), arguments.timeout_s);
+  append(line, "nothing valid received on %s for %g s", where.c_str(), arguments.timeout_s);
+  line += receiver.counters().refused_total() == 0
+              ? ": is a sender running, and does it send to this address?\n"
+              : ", refused " + refused_text(receiver) +
+                    (keyed ? ": does the sender sign with a key of " + arguments.key_file + "?\n"
+                           : ": is it stereotrack that sends to this address?\n");
   messages << line << std::flush;
   return 1;
 }

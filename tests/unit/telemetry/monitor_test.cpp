@@ -229,6 +229,16 @@ TEST_F(KeyedMonitor, EachForgedAlteredCutOrReplayedDatagramIsRefusedAndCountedBy
   EXPECT_EQ(run.messages.find("not checked"), std::string::npos);
 }
 
+TEST_F(KeyedMonitor, RefusalsAreShownWhereNothingElseIs) {
+  const auto unsigned_ones = long_stream(1);
+  const Outcome table = run_with({.live = true, .timeout_s = 0.3, .key_file = key_file_}, unsigned_ones);
+  EXPECT_THAT(table.out, testing::ContainsRegex("ctrl-C ends  refused [0-9]+ \\([0-9]+ unsigned\\)"));
+  EXPECT_THAT(table.out, HasSubstr("nothing received yet"));
+  EXPECT_THAT(table.messages,
+              testing::ContainsRegex("nothing valid received on .* for 0.3 s, refused [0-9]+ "
+                                     "\\([0-9]+ unsigned\\): does the sender sign with a key of .*key"));
+}
+
 TEST_F(KeyedMonitor, JsonSaysWhichKeyWasVerified) {
   const Outcome run = run_with({.json = true, .count = 1, .key_file = key_file_}, live_stream(2000));
   EXPECT_EQ(run.exit_code, 0);
