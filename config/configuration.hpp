@@ -40,6 +40,7 @@ struct SyntheticConfig {
 struct LatencyConfig {
   double output_ms = 50.0;  ///< [ms]
   double lead_ms = 0.8;     ///< [ms]
+  double awake_ms = 0.05;   ///< [ms]
   double grace_ms = 2.0;    ///< [ms]
   double stale_ms = 500.0;  ///< over output_ms [ms]
   int missing_limit = 30;
@@ -109,6 +110,7 @@ struct ZoneConfig {
   std::array<double, 2> z_m{};
   std::vector<std::array<double, 2>> picture;  ///< corners [px]; empty: a box in space
   ZoneAnchor anchor = ZoneAnchor::kCentre;
+  friend bool operator==(const ZoneConfig&, const ZoneConfig&) = default;
 };
 
 enum class SignalWhen : unsigned char {
@@ -137,6 +139,7 @@ struct SignalConfig {
   double hold_ms = 0;   ///< [ms]
   ActiveLevel active = ActiveLevel::kHigh;
   SafeState safe = SafeState::kInactive;
+  friend bool operator==(const SignalConfig&, const SignalConfig&) = default;
 };
 
 /// The black box and what it writes: docs/RECORDING.md.
@@ -151,7 +154,6 @@ struct RecordConfig {
   bool on_deadline = true;  ///< triggers
   bool on_zone = false;
   bool on_signal = true;
-  bool on_input = false;
 };
 
 /// Everything the user can say, with its defaults. Plain values: read it anywhere, once loaded it does

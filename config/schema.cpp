@@ -68,6 +68,9 @@ std::vector<Key> keys_of(Configuration& c) {
       key("latency.lead_ms", c.latency.lead_ms, 0, 1000, "ms",
           "How long before that moment the publisher decides what leaves, predicts and encodes it: a result that comes "
           "later is late."),
+      key("latency.awake_ms", c.latency.awake_ms, 0, 10, "ms",
+          "The publisher is awake for the last part of its wait, so that what the kernel takes to wake it does not "
+          "make the result late; costs that much of a core."),
       key("latency.grace_ms", c.latency.grace_ms, 0, 1000, "ms",
           "How long after that moment a result may still leave, flagged, when the publisher was kept from running."),
       key("latency.stale_ms", c.latency.stale_ms, 0, 60000, "ms",
@@ -137,7 +140,6 @@ std::vector<Key> keys_of(Configuration& c) {
       key("record.on_deadline", c.record.on_deadline, "Records when a result was not there in time."),
       key("record.on_zone", c.record.on_zone, "Records when a target comes into a zone."),
       key("record.on_signal", c.record.on_signal, "Records when the service is sent SIGUSR1."),
-      key("record.on_input", c.record.on_input, "Records when the GPIO input says so."),
 
       key("equalise.mode", p.equalise,
           {{"off", EqualiseMode::kOff}, {"frame", EqualiseMode::kFrame}, {"frozen", EqualiseMode::kFrozen}},

@@ -304,7 +304,10 @@ void BlackBox::note(const OutputNote& output) noexcept {
 // ---- service thread
 
 void BlackBox::take_notes() noexcept {
-  for (OutputNote output; outputs_.pop(output);) notes_[noted_++ % kNotes] = output;
+  for (OutputNote output; outputs_.pop(output);) {
+    notes_[noted_++ % kNotes] = output;
+    told_ordinal_ = std::max(told_ordinal_, output.ordinal);
+  }
 }
 
 bool BlackBox::service_step() noexcept {
@@ -331,7 +334,7 @@ bool BlackBox::service_step() noexcept {
 
 // Messages leave after their frames: whether those of the last ones are there, or have not come for long.
 bool BlackBox::is_told() noexcept {
-  const bool told = noted_ == 0 || notes_[(noted_ - 1) % kNotes].ordinal >= last_ordinal_written_;
+  const bool told = noted_ == 0 || told_ordinal_ >= last_ordinal_written_;
   return told || ++rounds_waited_ > kMostRounds;
 }
 
@@ -447,9 +450,13 @@ void BlackBox::write_some() {
 }
 
 void BlackBox::end() {
+  // What left with states of these frames, in its order; without any state only amid them.
+  bool begun = false;
   for (std::uint64_t i = noted_ > kNotes ? noted_ - kNotes : 0; i < noted_; ++i) {
     const OutputNote& note = notes_[i % kNotes];
-    if (note.ordinal < first_ordinal_ || note.ordinal > last_ordinal_written_) continue;
+    if (note.state_ordinal > last_ordinal_written_) break;
+    begun = begun || note.state_ordinal >= first_ordinal_;
+    if (!begun) continue;
     writer_.write(RecordKind::kOutput, std::as_bytes(std::span(&note, 1)));
   }
   if (!writer_.commit()) throw std::runtime_error(writer_.status());

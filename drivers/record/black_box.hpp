@@ -201,6 +201,7 @@ class BlackBox {
   RecordingWriter writer_;
   std::vector<OutputNote> notes_;  // a ring of the last ones
   std::uint64_t noted_ = 0;
+  std::uint64_t told_ordinal_ = 0;  // newest pair of which a message was noted
   std::string last_recording_;
   std::string last_error_;
 };

@@ -48,7 +48,7 @@ struct RecordHeader {
 
 /// What was decided for a frame by clocks, queues and budgets, and not by the pipeline: inputs of a replay.
 struct FrameDecisions {
-  std::uint8_t shed = 0;                          ///< runtime::EffortBits in force while it ran
+  std::uint8_t shed = 0;                          ///< EffortBits in force while it ran
   std::array<std::uint32_t, kStages> stage_us{};  ///< how long the stages took, by Stage [us]; replays do not care
   friend bool operator==(const FrameDecisions&, const FrameDecisions&) = default;
 };
@@ -77,18 +77,34 @@ struct TrackNote {
 };
 inline constexpr std::size_t kMostTrackNotes = 32;
 
-/// One message that left, or was due: the publisher's decisions.
+/// One message that left: the publisher's decisions, and what it had measured. Conversions: output_note.hpp.
 struct OutputNote {
-  std::uint64_t ordinal = 0;         ///< of the pair whose slot it was
-  std::uint64_t state_ordinal = 0;   ///< of the pair whose state went out: another where its own result was late
+  static constexpr std::uint32_t kHasLive = 1;  ///< bits of `has`: the fields below mean something
+  static constexpr std::uint32_t kHasTaiError = 2;
+  static constexpr std::uint32_t kHasSkew = 4;
+  static constexpr std::uint32_t kHasSendError = 8;
+
+  std::uint64_t ordinal = 0;         ///< of the pair whose slot it was; 0: no pair came
+  std::uint64_t state_ordinal = 0;   ///< of the pair whose state went out; 0: none did
   std::uint64_t sequence = 0;        ///< of the message, from 1
+  std::int64_t capture_ns = 0;       ///< Message::capture_time
   std::int64_t send_ns = 0;          ///< Message::send_time, capture clock
   std::int64_t latency_ns = 0;       ///< Message::latency
-  std::int64_t late_ns = 0;          ///< measured: how much later than due the message before left
+  std::int64_t ahead_ns = 0;         ///< so far the state was predicted beyond its own capture time
   std::uint32_t kind = 0;            ///< runtime::OutputSchedule::Kind
   std::uint32_t flags = 0;           ///< Message::flags
   std::uint32_t frames_skipped = 0;  ///< Message::frames_skipped
   std::uint32_t tracks_dropped = 0;  ///< Message::tracks_dropped
+  std::int64_t tai_offset_ns = 0;    ///< telemetry::Live, from here on
+  std::int64_t tai_error_ns = 0;
+  std::int64_t skew_ns = 0;
+  std::int64_t send_error_ns = 0;
+  std::uint32_t exposure_left_us = 0;
+  std::uint32_t exposure_right_us = 0;
+  std::uint32_t health = 0;
+  std::uint32_t shed = 0;
+  std::uint32_t has = 0;
+  std::uint32_t reserved = 0;
 };
 
 struct KeyframeMeta {
@@ -103,7 +119,7 @@ struct EndMeta {
 
 static_assert(std::endian::native == std::endian::little);
 static_assert(sizeof(FileHeader) == 16 && sizeof(RecordHeader) == 32 && sizeof(FrameMeta) == 72 &&
-              sizeof(TrackNote) == 28 && sizeof(OutputNote) == 64 && sizeof(KeyframeMeta) == 16 &&
+              sizeof(TrackNote) == 28 && sizeof(OutputNote) == 128 && sizeof(KeyframeMeta) == 16 &&
               sizeof(EndMeta) == 16);
 static_assert(std::is_trivially_copyable_v<FrameMeta> && std::is_trivially_copyable_v<OutputNote>);
 

@@ -105,8 +105,7 @@ void RecordingSource::index() {
       case RecordKind::kFrame: frames_.push_back(record); break;
       case RecordKind::kOutput:
         if (record.payload.size() == sizeof(OutputNote) && checksum(record.payload) == record.header.sum) {
-          const auto note = value_at<OutputNote>(record.payload);
-          outputs_[note.ordinal] = note;
+          outputs_.push_back(value_at<OutputNote>(record.payload));
         } else {
           ++outputs_damaged;
         }
@@ -174,15 +173,6 @@ capture::Next RecordingSource::next(FramePair& out) noexcept {
 
 void RecordingSource::skip_to(std::uint64_t ordinal) noexcept {
   while (at_ < frames_.size() && value_at<FrameMeta>(frames_[at_].payload).ordinal <= ordinal) ++at_;
-}
-
-const OutputNote* RecordingSource::first_output() const noexcept {
-  return outputs_.empty() ? nullptr : &outputs_.begin()->second;
-}
-
-const OutputNote* RecordingSource::output_of(std::uint64_t ordinal) const noexcept {
-  const auto found = outputs_.find(ordinal);
-  return found == outputs_.end() ? nullptr : &found->second;
 }
 
 }  // namespace stereotrack::record

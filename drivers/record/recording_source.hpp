@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -51,12 +50,9 @@ class RecordingSource final : public capture::FrameSource {
   [[nodiscard]] const FrameDecisions& decisions() const noexcept { return decisions_; }
   [[nodiscard]] std::span<const TrackNote> track_notes() const noexcept { return track_notes_; }
 
-  /// Whether the run's messages were recorded.
-  [[nodiscard]] bool has_outputs() const noexcept { return !outputs_.empty(); }
-  /// The first of them that belongs to a pair of the recording; null: none.
-  [[nodiscard]] const OutputNote* first_output() const noexcept;
-  /// The message of that pair's slot, or null: none left.
-  [[nodiscard]] const OutputNote* output_of(std::uint64_t ordinal) const noexcept;
+  /// The run's messages that left with a state of one of these pairs, in the order in which they left; empty: they were
+  /// not recorded.
+  [[nodiscard]] std::span<const OutputNote> outputs() const noexcept { return outputs_; }
 
  private:
   struct FileRecord {
@@ -77,7 +73,7 @@ class RecordingSource final : public capture::FrameSource {
   std::string skip_reason_;
   std::span<const std::byte> keyframe_;
   std::vector<FileRecord> frames_;
-  std::map<std::uint64_t, OutputNote> outputs_;
+  std::vector<OutputNote> outputs_;
   std::size_t at_ = 0;
   FrameDecisions decisions_;
   std::vector<TrackNote> track_notes_;

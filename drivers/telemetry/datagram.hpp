@@ -63,7 +63,7 @@ struct Live {
   std::uint32_t exposure_left_us = 0;  ///< [us]; 0 = not known
   std::uint32_t exposure_right_us = 0;
   std::optional<std::chrono::nanoseconds> send_error;  ///< of the message before: sent - due
-  std::uint8_t efforts_shed = 0;                       ///< runtime::EffortBits
+  std::uint8_t efforts_shed = 0;                       ///< EffortBits
   std::uint32_t health = 0;                            ///< sum of Health
 
   [[nodiscard]] bool operator==(const Live&) const noexcept = default;
@@ -74,7 +74,7 @@ struct Live {
 struct Status {
   std::uint64_t uptime_ms = 0;
   std::uint32_t health = 0;       ///< sum of Health
-  std::uint8_t efforts_shed = 0;  ///< now, runtime::EffortBits
+  std::uint8_t efforts_shed = 0;  ///< now, EffortBits
   std::uint32_t latency_us = 0;   ///< configured
   std::uint32_t period_us = 0;
 

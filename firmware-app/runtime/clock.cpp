@@ -28,6 +28,12 @@ void sleep_until(MonotonicTime moment) noexcept {
   }
 }
 
+void sleep_until(MonotonicTime moment, std::chrono::nanoseconds awake) noexcept {
+  sleep_until(moment - awake);
+  while (monotonic_now() < moment) {
+  }
+}
+
 TaiReading read_tai() noexcept {
   const std::chrono::nanoseconds before = read(CLOCK_MONOTONIC);
   const std::chrono::nanoseconds tai = read(CLOCK_TAI);

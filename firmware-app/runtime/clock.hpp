@@ -13,6 +13,10 @@ namespace stereotrack::runtime {
 /// Sleeps until a moment of CLOCK_MONOTONIC; signals do not end it. Returns at once if it is over.
 void sleep_until(MonotonicTime moment) noexcept;
 
+/// The same, but awake for the last `awake` of it: what the kernel takes to wake a thread, tens of microseconds and
+/// never the same, is over by then. Costs that much of a core.
+void sleep_until(MonotonicTime moment, std::chrono::nanoseconds awake) noexcept;
+
 /// Where TAI lies, as the kernel knows it.
 struct TaiReading {
   std::chrono::nanoseconds offset{0};             ///< TAI - CLOCK_MONOTONIC

@@ -20,8 +20,8 @@
 
 #include "drivers/telemetry/receiver.hpp"
 #include "drivers/telemetry/udp_listener.hpp"
-#include "firmware-app/runtime/effort.hpp"
 #include "firmware-app/stereotrack/interrupt.hpp"
+#include "pipeline/effort.hpp"
 
 namespace stereotrack {
 namespace {
@@ -103,11 +103,10 @@ std::string health_names(std::uint32_t health) {
 }
 
 std::string effort_names(std::uint32_t efforts) {
-  using runtime::Effort;
-  std::array<BitName, runtime::kEfforts> names{};
+  std::array<BitName, kEfforts> names{};
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto effort = static_cast<Effort>(i);
-    names[i] = {runtime::bit_of(effort), to_string(effort)};
+    names[i] = {bit_of(effort), to_string(effort)};
   }
   return bit_names(efforts, names);
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
@@ -12,17 +13,20 @@
 #include <thread>
 
 #include "config/schema.hpp"
+#include "drivers/record/output_note.hpp"
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/encoder.hpp"
 #include "drivers/telemetry/file_sink.hpp"
 #include "drivers/telemetry/udp_sender.hpp"
 #include "firmware-app/render/renderer.hpp"
 #include "firmware-app/runtime/allocation_count.hpp"
+#include "firmware-app/runtime/output_schedule.hpp"
 #include "firmware-app/stereotrack/interrupt.hpp"
 #include "firmware-app/stereotrack/output_file.hpp"
 #include "firmware-app/stereotrack/progress.hpp"
 #include "firmware-app/stereotrack/summary.hpp"
 #include "firmware-app/stereotrack/tracks_file.hpp"
+#include "pipeline/track/extrapolate.hpp"
 
 namespace stereotrack {
 
@@ -84,7 +88,7 @@ telemetry::Encoder::Config identity_of(const Rig& rig) {
   if (rig.recording == nullptr || !rig.recording->about().exact) return config;
   config.rig = rig.recording->about().rig;
   config.session = rig.recording->about().session;
-  if (const record::OutputNote* first = rig.recording->first_output()) config.sequence = first->sequence - 1;
+  if (!rig.recording->outputs().empty()) config.sequence = rig.recording->outputs().front().sequence - 1;
   return config;
 }
 
@@ -236,6 +240,10 @@ class Replay {
   }
 
   void publish(const FramePair& pair, const FrameResult& result) {
+    if (rig_.recording != nullptr && !rig_.recording->outputs().empty()) {
+      publish_as_recorded(*rig_.recording, pair, result);
+      return;
+    }
     const auto latency =
         std::chrono::nanoseconds(static_cast<std::int64_t>(rig_.configuration().latency.output_ms * 1e6 + 0.5));
     telemetry::Message message;
@@ -246,19 +254,38 @@ class Replay {
     message.latency = latency;
     message.flags = telemetry_flags(result.flags, skipped_before_);
     message.frames_skipped = static_cast<std::uint32_t>(summary_.skipped);
+    send(message);
+  }
+
+  // What left in the run with the states up to this pair's, as the run's publisher predicted them.
+  void publish_as_recorded(const record::RecordingSource& recording, const FramePair& pair, const FrameResult& result) {
+    states_.push_back({pair.ordinal, {result.tracks.begin(), result.tracks.end()}});
+    if (states_.size() > kMostStates) states_.pop_front();
+    const capture::SourceInfo& info = recording.info();
+    const Extrapolation model{rig_.configuration().pipeline.track.acceleration, info.width, info.height};
+    const std::span<const record::OutputNote> outputs = recording.outputs();
+    for (; next_output_ < outputs.size() && outputs[next_output_].state_ordinal <= pair.ordinal; ++next_output_) {
+      const record::OutputNote& note = outputs[next_output_];
+      const auto state = std::find_if(states_.begin(), states_.end(),
+                                      [&](const State& one) { return one.ordinal == note.state_ordinal; });
+      if (state == states_.end() && note.state_ordinal != 0) continue;  // its pair was left out of the replay
+      std::vector<TrackReport> tracks;
+      if (state != states_.end()) tracks = state->tracks;
+      for (TrackReport& track : tracks) {
+        extrapolate(model, static_cast<double>(note.ahead_ns) * 1e-9, track);
+        if (note.kind != static_cast<std::uint32_t>(runtime::OutputSchedule::Kind::kOnTime)) coast(track);
+      }
+      telemetry::Message message = record::message_of(note);
+      message.tracks = tracks;
+      send(message);
+    }
+  }
+
+  void send(telemetry::Message& message) {
     message.unit_m = rig_.unit_m;
     if (rig_.calibration) {
       message.focal_x_px = rig_.calibration->left.fx;
       message.focal_y_px = rig_.calibration->left.fy;
-    }
-    if (rig_.recording != nullptr && rig_.recording->has_outputs()) {
-      const record::OutputNote* output = rig_.recording->output_of(pair.ordinal);
-      if (output == nullptr) return;  // in the run none left for this pair either
-      message.send_time = CaptureTime(std::chrono::nanoseconds(output->send_ns));
-      message.latency = std::chrono::nanoseconds(output->latency_ns);
-      message.flags = output->flags;
-      message.frames_skipped = output->frames_skipped;
-      message.tracks_dropped = output->tracks_dropped;
     }
     if (arguments_.real_time && pacer_.wait(message.send_time)) {
       ++summary_.deadline_misses;
@@ -290,6 +317,15 @@ class Replay {
   TracksFile tracks_;
   Summary summary_;
   bool skipped_before_ = false;
+
+  // Of a recording: states that messages may yet leave with, and how far they have left.
+  struct State {
+    std::uint64_t ordinal = 0;
+    std::vector<TrackReport> tracks;
+  };
+  static constexpr std::size_t kMostStates = 64;
+  std::deque<State> states_;
+  std::size_t next_output_ = 0;
 };
 
 }  // namespace

@@ -20,4 +20,10 @@ struct Extrapolation {
 /// refuses it. Any thread, O(1).
 void extrapolate(const Extrapolation& model, double seconds, TrackReport& report) noexcept;
 
+/// What is said of a target in place of a pair of its own in which it could have been measured.
+inline void coast(TrackReport& report) noexcept {
+  report.measured = false;
+  if (report.state == TrackState::kConfirmed) report.state = TrackState::kCoasting;
+}
+
 }  // namespace stereotrack

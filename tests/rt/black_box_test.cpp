@@ -48,7 +48,9 @@ std::uint64_t heap_calls_of_a_run(int reduce) {
       box.capture(pair, *result, {});
       while (box.keyframe_step(*pipeline)) {
       }
-      box.note(OutputNote{.ordinal = pair.ordinal});
+      OutputNote note;
+      note.ordinal = note.state_ordinal = pair.ordinal;
+      box.note(note);
       if (ordinal % 100 == 50) box.trigger(kDeadlineMiss);
       if (ordinal % 100 == 70) box.no_frame();
       calls += watch.calls();

@@ -86,6 +86,9 @@ void Film::advance() noexcept {
 LiveSource::Step Film::step(PairOutlet& outlet, MonotonicTime until) noexcept {
   if (ended_) return Step::kEnded;
   if (!next_) next_ = now();
+  std::uint32_t slot = 0;
+  while (outlet.take_back(slot)) {  // nothing to requeue, but what is free is counted as free
+  }
   if (*next_ > until) {
     sleep_until(until);
     return Step::kGoing;

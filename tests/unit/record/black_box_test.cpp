@@ -364,18 +364,37 @@ TEST(BlackBox, MessagesOfTheRecordedFramesAreKept) {
     rig.step(ordinal);
     if (ordinal == 40) rig.box().trigger(kDeadlineMiss);
     if (ordinal > 2 && ordinal != 42) {
-      rig.box().note({.ordinal = static_cast<std::uint64_t>(ordinal) - 2,
-                      .sequence = static_cast<std::uint64_t>(ordinal),
-                      .send_ns = ordinal * 10});
+      // Of pair 44 nothing came in time: the state of 43 left once more; and one slot had no pair and no state at all.
+      OutputNote note;
+      note.ordinal = static_cast<std::uint64_t>(ordinal) - 2;
+      note.state_ordinal = note.ordinal == 44 ? 43 : note.ordinal;
+      if (note.ordinal == 46) note.ordinal = note.state_ordinal = 0;
+      note.sequence = static_cast<std::uint64_t>(ordinal);
+      note.send_ns = ordinal * 10;
+      rig.box().note(note);
     }
   }
   rig.serve();
   const RecordingSource source(rig.box().last_recording());
-  ASSERT_NE(source.output_of(45), nullptr);
-  EXPECT_EQ(source.output_of(45)->send_ns, 470);
-  EXPECT_EQ(source.output_of(40), nullptr) << "none left for it";
-  EXPECT_EQ(source.output_of(1), nullptr) << "before the first frame";
-  EXPECT_EQ(source.first_output()->sequence, source.first_output()->ordinal + 2);
+  std::uint64_t before = 0;
+  for (const OutputNote& note : source.outputs()) {
+    EXPECT_GT(note.sequence, before) << "in the order in which they left";
+    before = note.sequence;
+    EXPECT_EQ(note.send_ns, static_cast<std::int64_t>(note.sequence) * 10);
+    EXPECT_NE(note.ordinal, 40U) << "none left for it";
+  }
+  const auto with_sequence = [&](std::uint64_t sequence) {
+    return std::count_if(source.outputs().begin(), source.outputs().end(),
+                         [&](const OutputNote& note) { return note.sequence == sequence; });
+  };
+  EXPECT_EQ(with_sequence(47), 1);  // pair 45
+  EXPECT_EQ(with_sequence(46), 1);  // pair 44, with the state of 43
+  EXPECT_EQ(with_sequence(48), 1);  // the slot without a pair
+  FramePair first;
+  RecordingSource again(rig.box().last_recording());
+  ASSERT_EQ(again.next(first), capture::Next::kPair);
+  ASSERT_FALSE(source.outputs().empty());
+  EXPECT_EQ(source.outputs().front().state_ordinal, first.ordinal);
 }
 
 TEST(BlackBox, WaitsForTheLastFramesMessagesButNotForEver) {

@@ -59,7 +59,7 @@ void write_recording(const fs::path& path) {
   ASSERT_TRUE(writer.write(RecordKind::kKeyframe, std::vector<std::byte>(sizeof(KeyframeMeta) + 100, std::byte{4})));
   for (std::uint64_t ordinal = 11; ordinal <= 14; ++ordinal) {
     ASSERT_TRUE(writer.write(RecordKind::kFrame, frame_payload(ordinal)));
-    const OutputNote note{.ordinal = ordinal, .sequence = ordinal + 100, .send_ns = 77};
+    const OutputNote note{.ordinal = ordinal, .state_ordinal = ordinal, .sequence = ordinal + 100, .send_ns = 77};
     if (ordinal == 12 || ordinal == 13) writer.write(RecordKind::kOutput, std::as_bytes(std::span(&note, 1)));
   }
   ASSERT_TRUE(writer.commit()) << writer.status();
@@ -91,7 +91,8 @@ TEST(Recording, ReadsBackAsItWasWritten) {
   EXPECT_EQ(source.configuration(), "preset = \"thesis\"\n");
   EXPECT_EQ(source.calibration()->left.fx, 0.1);
   EXPECT_EQ(source.keyframe().size(), 100U);
-  EXPECT_EQ(source.first_output()->sequence, 112U);
+  ASSERT_FALSE(source.outputs().empty());
+  EXPECT_EQ(source.outputs().front().sequence, 112U);
   FramePair pair;
   for (std::uint64_t ordinal = 11; ordinal <= 14; ++ordinal) {
     ASSERT_EQ(source.next(pair), capture::Next::kPair);
@@ -104,8 +105,10 @@ TEST(Recording, ReadsBackAsItWasWritten) {
     const std::vector<std::byte> payload = frame_payload(ordinal);
     EXPECT_EQ(std::memcmp(pair.left.data, payload.data() + kFrameHead, kPicture), 0);
     EXPECT_EQ(std::memcmp(pair.right.data, payload.data() + kFrameHead + kPicture, kPicture), 0);
-    EXPECT_EQ(source.output_of(ordinal) != nullptr, ordinal == 12 || ordinal == 13);
   }
+  ASSERT_EQ(source.outputs().size(), 2U);
+  EXPECT_EQ(source.outputs()[0].ordinal, 12U);
+  EXPECT_EQ(source.outputs()[1].ordinal, 13U);
   EXPECT_EQ(source.next(pair), capture::Next::kEnd);
   EXPECT_TRUE(source.keyframe().empty()) << "frames were taken: the state is another now";
 }

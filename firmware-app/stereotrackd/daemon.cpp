@@ -1,0 +1,195 @@
+#include "firmware-app/stereotrackd/daemon.hpp"
+
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "config/error.hpp"
+#include "config/schema.hpp"
+#include "firmware-app/runtime/clock.hpp"
+
+namespace stereotrack::daemon {
+
+namespace {
+
+std::chrono::nanoseconds from_ms(double ms) {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(ms * 1e6 + 0.5));
+}
+
+runtime::RealTimeMode mode_of(config::RealTimeMode mode) {
+  switch (mode) {
+    case config::RealTimeMode::kEnforce: return runtime::RealTimeMode::kEnforce;
+    case config::RealTimeMode::kTry: return runtime::RealTimeMode::kTry;
+    case config::RealTimeMode::kOff: break;
+  }
+  return runtime::RealTimeMode::kOff;
+}
+
+runtime::ThreadPlan plan_of(const char* name, const config::ThreadConfig& config) {
+  return {name, config.priority, config.core};
+}
+
+runtime::OutputSchedule::Config schedule_config(const config::LatencyConfig& latency, std::chrono::nanoseconds period) {
+  runtime::OutputSchedule::Config schedule;
+  schedule.latency = from_ms(latency.output_ms);
+  schedule.period = period;
+  schedule.lead = from_ms(latency.lead_ms);
+  // Under a period by nature: later than that, the next slot is due.
+  schedule.grace = std::min<std::chrono::nanoseconds>(from_ms(latency.grace_ms), period / 2);
+  schedule.oldest_state = from_ms(latency.output_ms + latency.stale_ms);
+  schedule.missing_limit = latency.missing_limit;
+  return schedule;
+}
+
+record::BlackBox::Config box_config(const config::RecordConfig& record) {
+  return {.seconds = record.seconds,
+          .seconds_after = record.seconds_after,
+          .reduce = record.reduce,
+          .every = record.every,
+          .directory = record.directory,
+          .max_bytes = static_cast<std::uint64_t>(record.max_mb) << 20U};
+}
+
+/// What the publisher may trigger; the others are the main thread's.
+std::uint32_t causes_of(const config::RecordConfig& record) {
+  return (record.on_deadline ? record::kDeadlineMiss : 0U) | (record.on_zone ? record::kTargetInZone : 0U);
+}
+
+}  // namespace
+
+runtime::EffortController::Config effort_config(const config::ShedConfig& shed) {
+  runtime::EffortController::Config made;
+  made.shed_above = shed.above;
+  made.restore_below = shed.below;
+  made.shed_after = shed.after_frames;
+  made.restore_after = shed.restore_frames;
+  made.patience_most = std::max(made.patience_most, shed.restore_frames);
+  for (const std::string& name : shed.order) {
+    for (std::size_t i = 0; i < kEfforts; ++i) {
+      if (name == to_string(static_cast<Effort>(i))) (void)made.order.push(static_cast<Effort>(i));
+    }
+  }
+  return made;
+}
+
+Daemon::Daemon(Parts parts)
+    : vitals_(std::make_unique<Vitals>()),
+      source_(std::move(parts.source)),
+      lines_(std::move(parts.lines)),
+      signer_(std::move(parts.signer)),
+      pool_(parts.pool_slots),
+      outlet_(pool_, notices_, bell_),
+      mailbox_(std::make_unique<OutcomeMailbox>()) {
+  const config::Configuration& configuration = *parts.configuration;
+  const capture::SourceInfo& info = source_->info();
+  Publisher::Config publishing;
+  publishing.schedule = schedule_config(configuration.latency, info.period);
+  if (publishing.schedule.latency / info.period > static_cast<int>(runtime::OutputSchedule::kMaxInFlight / 2)) {
+    throw config::Error("latency.output_ms: more than " + std::to_string(runtime::OutputSchedule::kMaxInFlight / 2) +
+                        " pairs would be on their way at once: shorten it, or lower the rate of the source");
+  }
+  publishing.encoder = {.rig = configuration.telemetry.rig_id, .session = parts.session, .signer = signer_.get()};
+  publishing.extrapolation = {
+      .acceleration = configuration.pipeline.track.acceleration, .width = info.width, .height = info.height};
+  publishing.unit_m = parts.unit_m;
+  if (parts.calibration != nullptr) {
+    publishing.focal_x_px = parts.calibration->left.fx;
+    publishing.focal_y_px = parts.calibration->left.fy;
+  }
+  publishing.heart_after = from_ms(configuration.latency.stale_ms);
+  publishing.awake = from_ms(configuration.latency.awake_ms);
+  publishing.pool_slots = parts.pool_slots;
+  auto publisher = Publisher::create(publishing, std::move(parts.plan), lines_, pool_, notices_, *mailbox_, bell_,
+                                     *source_, *vitals_);
+  if (!publisher.has_value()) {
+    throw config::Error("latency: no schedule fits " + info.name + ": " + to_string(publisher.error()));
+  }
+  publisher_ = std::move(*publisher);
+
+  const Result<runtime::EffortController> effort = runtime::EffortController::create(effort_config(configuration.shed));
+  if (!effort.has_value()) throw config::Error(std::string("shed: ") + to_string(effort.error()));
+  frames_ = std::make_unique<FrameLoop>(FrameLoop::Config{.latency = publishing.schedule.latency,
+                                                          .lead = publishing.schedule.lead,
+                                                          .period = info.period,
+                                                          .also = parts.also},
+                                        *effort, pool_, *mailbox_, bell_, *source_, *vitals_);
+  const Pipeline::Setup setup{.width = info.width,
+                              .height = info.height,
+                              .colour = has_colour(info.format),
+                              .calibration = parts.calibration,
+                              .observer = frames_->observer()};
+  const Result<Pipeline> pipeline = Pipeline::create(configuration.pipeline, setup, arena_);
+  if (!pipeline.has_value()) {
+    throw std::runtime_error(info.name + ": no pipeline for pictures of " + std::to_string(info.width) + "x" +
+                             std::to_string(info.height) + ": " + to_string(pipeline.error()));
+  }
+  pipeline_ = std::make_unique<Pipeline>(*pipeline);
+  arena_.seal();
+  if (configuration.record.on) {
+    record::BlackBox::Run run;
+    run.about.source = info.name;
+    run.about.program = parts.program;
+    run.about.format = info.format;
+    run.about.period_ns = info.period.count();
+    run.about.rig = configuration.telemetry.rig_id;
+    run.about.session = parts.session;
+    run.about.unit_m = parts.unit_m;
+    if (parts.calibration != nullptr) run.calibration = *parts.calibration;
+    run.configuration = config::to_text(configuration);
+    box_ = std::make_unique<record::BlackBox>(box_config(configuration.record), std::move(run), *pipeline_);
+    frames_->keep_in(box_.get());
+    publisher_->keep_in(box_.get(), causes_of(configuration.record));
+  }
+}
+
+Daemon::~Daemon() { stop(); }
+
+std::vector<runtime::Missing> Daemon::start(const config::RealTimeConfig& real_time, bool missing_before) {
+  const runtime::RealTimeMode mode = mode_of(real_time.mode);
+  std::vector<runtime::Missing> missing;
+  const auto begin = [&](const char* name, const config::ThreadConfig& config, std::function<void()> body) {
+    threads_.push_back(std::make_unique<runtime::Thread>(plan_of(name, config), mode, std::move(body)));
+    const auto& lacks = threads_.back()->missing();
+    missing.insert(missing.end(), lacks.begin(), lacks.end());
+  };
+  // Who takes before who gives.
+  if (box_) {
+    // A thread of its own: a disk that hangs must not keep the main thread from ending the daemon.
+    begin("st-recorder", real_time.service, [this] {
+      while (!stop_recorder_.load(std::memory_order_relaxed)) {
+        while (box_->service_step() && !stop_recorder_.load(std::memory_order_relaxed)) {
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      }
+    });
+  }
+  begin("st-publisher", real_time.publisher, [this] { publisher_->run(capture_end_.ended, stop_publisher_); });
+  begin("st-frames", real_time.frames, [this] { frames_->run(*pipeline_, stop_capture_); });
+  begin("st-capture", real_time.capture,
+        [this] { capture(*source_, outlet_, pool_, *vitals_, capture_end_, stop_capture_); });
+  if (missing_before || !missing.empty()) publisher_->say_always(telemetry::kHealthNotRealTime);
+  return missing;
+}
+
+bool Daemon::make_lines_safe() noexcept { return lines_.set_safe(runtime::monotonic_now()).failed == 0; }
+
+void Daemon::stop() noexcept {
+  stop_capture_.store(true, std::memory_order_relaxed);
+  pool_.close();
+  stop_publisher_.store(true, std::memory_order_relaxed);
+  bell_.ring();
+  stop_recorder_.store(true, std::memory_order_relaxed);
+  for (const auto& thread : threads_) thread->join();
+  threads_.clear();
+}
+
+bool Daemon::is_over() const noexcept {
+  return publisher_->has_finished() || capture_end_.failed.load(std::memory_order_acquire);
+}
+
+std::string Daemon::failure() const {
+  return capture_end_.failed.load(std::memory_order_acquire) ? source_->failure() : std::string();
+}
+
+}  // namespace stereotrack::daemon

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/configuration.hpp"
+#include "drivers/capture/frame_pool.hpp"
+#include "drivers/capture/live_source.hpp"
+#include "drivers/gpio/line.hpp"
+#include "drivers/record/black_box.hpp"
+#include "drivers/telemetry/authentication.hpp"
+#include "firmware-app/runtime/real_time.hpp"
+#include "firmware-app/stereotrackd/capture_rt.hpp"
+#include "firmware-app/stereotrackd/frames_rt.hpp"
+#include "firmware-app/stereotrackd/publisher_rt.hpp"
+#include "firmware-app/stereotrackd/vitals.hpp"
+#include "pipeline/core/arena.hpp"
+#include "pipeline/pipeline.hpp"
+
+namespace stereotrack::daemon {
+
+/// Three threads around one source, one pipeline, one publisher, and one that writes recordings:
+///
+///     capture: LiveSource -> PairOutlet -> FramePool -> frames: Pipeline -> OutcomeMailbox -> publisher:
+///     OutputSchedule
+///                                 └──────────── notices ────────────────────────────────────────┘  -> lines, sink
+///
+/// It does not know where its parts come from: programs and tests make them. One owner, whose thread calls all of it.
+class Daemon {
+ public:
+  struct Parts {
+    const config::Configuration* configuration = nullptr;  ///< read in the constructor alone
+    const StereoCalibration* calibration = nullptr;        ///< null: mono; the same
+    double unit_m = 0;                                     ///< 0: not known
+    std::unique_ptr<capture::LiveSource> source;
+    std::unique_ptr<Plan> plan;
+    gpio::OutputLines lines;
+    std::uint64_t session = 0;
+    std::unique_ptr<telemetry::Signer> signer;  ///< null: nothing is signed
+    StageObserver also;                         ///< told of each stage's end, in the frame loop
+    std::size_t pool_slots = 4;
+    std::string program;  ///< name and version, for recordings
+  };
+
+  /// Takes all memory. Throws std::runtime_error or config::Error, one line.
+  explicit Daemon(Parts parts);
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+  ~Daemon();
+
+  /// Begins. What the threads were not granted; with RealTimeMode::kOff nothing is asked for. If anything is missing,
+  /// here or before (`missing_before`), the health of all that leaves says so.
+  [[nodiscard]] std::vector<runtime::Missing> start(const config::RealTimeConfig& real_time, bool missing_before);
+
+  /// Ends the threads; the lines are in their safe states then. Takes up to 0.1 s.
+  void stop() noexcept;
+
+  /// The source has ended or failed, and all that it gave has left.
+  [[nodiscard]] bool is_over() const noexcept;
+  /// Why the source failed; empty: it did not.
+  [[nodiscard]] std::string failure() const;
+
+  /// The publisher goes on with another plan.
+  void exchange(std::unique_ptr<Plan> plan) { publisher_->exchange(std::move(plan)); }
+
+  /// Of the fault handler alone: drives the lines while the publisher may still do so. False: a chip refused.
+  [[nodiscard]] bool make_lines_safe() noexcept;
+  [[nodiscard]] const LastStates& last_states() const noexcept { return publisher_->last_states(); }
+
+  /// The black box; null: record.on is false.
+  [[nodiscard]] record::BlackBox* black_box() noexcept { return box_.get(); }
+  [[nodiscard]] const record::BlackBox* black_box() const noexcept { return box_.get(); }
+
+  [[nodiscard]] const Vitals& vitals() const noexcept { return *vitals_; }
+  [[nodiscard]] capture::FramePool::Counters pool() const noexcept { return pool_.counters(); }
+  [[nodiscard]] const gpio::OutputLines& lines() const noexcept { return lines_; }
+  [[nodiscard]] const capture::SourceInfo& source() const noexcept { return source_->info(); }
+  [[nodiscard]] const MemoryUse& memory() const noexcept { return pipeline_->memory(); }
+  [[nodiscard]] std::uint64_t lost_notices() const noexcept { return notices_.refused(); }
+
+ private:
+  std::unique_ptr<Vitals> vitals_;
+  std::unique_ptr<capture::LiveSource> source_;
+  gpio::OutputLines lines_;
+  std::unique_ptr<telemetry::Signer> signer_;
+  capture::FramePool pool_;
+  capture::PairOutlet::Notices notices_;
+  capture::Doorbell bell_;
+  capture::PairOutlet outlet_;
+  std::unique_ptr<OutcomeMailbox> mailbox_;
+  Arena arena_;
+  std::unique_ptr<FrameLoop> frames_;
+  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<Publisher> publisher_;
+  std::unique_ptr<record::BlackBox> box_;
+
+  CaptureEnd capture_end_;
+  std::atomic<bool> stop_capture_{false};
+  std::atomic<bool> stop_publisher_{false};
+  std::atomic<bool> stop_recorder_{false};
+  std::vector<std::unique_ptr<runtime::Thread>> threads_;
+};
+
+/// Effort names of shed.order, which config's rules have checked, as the controller wants them.
+[[nodiscard]] runtime::EffortController::Config effort_config(const config::ShedConfig& shed);
+
+}  // namespace stereotrack::daemon

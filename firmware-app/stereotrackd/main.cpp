@@ -1,0 +1,249 @@
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+
+#include "config/error.hpp"
+#include "drivers/capture/film/film.hpp"
+#include "drivers/telemetry/authentication.hpp"
+#include "drivers/telemetry/endpoint.hpp"
+#include "drivers/telemetry/session_file.hpp"
+#include "firmware-app/rig/rig.hpp"
+#include "firmware-app/runtime/real_time.hpp"
+#include "firmware-app/signals/set_up.hpp"
+#include "firmware-app/stereotrackd/daemon.hpp"
+#include "firmware-app/stereotrackd/log.hpp"
+#include "firmware-app/stereotrackd/panic.hpp"
+#include "firmware-app/stereotrackd/plan.hpp"
+#include "firmware-app/stereotrackd/service.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace stereotrack;
+using daemon::log;
+using daemon::LogLevel;
+
+constexpr int kFailed = 1;
+constexpr int kBadUsage = 2;
+
+struct Arguments {
+  std::string config;
+  std::vector<std::string> set;
+  bool check = false;
+  bool safe_lines = false;
+};
+
+capture::Film::Repeat repeat_of(config::Repeat repeat) {
+  switch (repeat) {
+    case config::Repeat::kLoop: return capture::Film::Repeat::kLoop;
+    case config::Repeat::kOnce: return capture::Film::Repeat::kOnce;
+    case config::Repeat::kBounce: break;
+  }
+  return capture::Film::Repeat::kBounce;
+}
+
+// Opens what source.name says; the film of it is drawn into memory.
+std::unique_ptr<capture::LiveSource> open_source(Rig& rig) {
+  const config::SourceConfig& source = rig.configuration().source;
+  if (source.name.starts_with(kSynthetic)) {
+    open_scene(source.name, rig);
+  } else if (record::is_recording(source.name)) {
+    auto recording = std::make_unique<record::RecordingSource>(source.name);
+    if (!recording->warning().empty()) log(LogLevel::kWarning, recording->warning());
+    rig.calibration = recording->calibration();
+    rig.calibration_name = source.name;
+    rig.unit_m = recording->about().unit_m;
+    rig.source = std::move(recording);
+  } else {
+    throw config::error_at(rig.loaded.origins, "source.name",
+                           source.name.empty()
+                               ? "not set: what is to be watched? For example \"synthetic:eleven\""
+                               : "\"" + source.name + "\" is no source: want synthetic:NAME, or a recording (.strec)");
+  }
+  if (!rig.configuration().calibration.file.empty() && rig.source->info().stereo) {
+    read_calibration(rig.configuration().calibration.file, {}, rig);
+  }
+  check_rig(rig);
+  auto film = std::make_unique<capture::Film>(
+      *rig.source, capture::Film::Config{.repeat = repeat_of(source.repeat),
+                                         .most_bytes = static_cast<std::uint64_t>(source.memory_mb) << 20});
+  rig.source.reset();
+  return film;
+}
+
+fs::path state_directory(const config::Configuration& configuration) {
+  if (!configuration.service.state_directory.empty()) return configuration.service.state_directory;
+  // Of systemd: one or several, colons between.
+  if (const char* given = std::getenv("STATE_DIRECTORY")) {
+    const std::string all = given;
+    return all.substr(0, all.find(':'));
+  }
+  const char* home = std::getenv("HOME");
+  if (home == nullptr) {
+    throw config::Error("service.state_directory: not set, and neither are $STATE_DIRECTORY and $HOME: give it");
+  }
+  return fs::path(home) / ".local/state/stereotrack";
+}
+
+void log_missing(const std::vector<runtime::Missing>& missing) {
+  for (const runtime::Missing& right : missing) {
+    log(LogLevel::kWarning, "not real-time: " + right.what + "; to grant it: " + right.grant,
+        {{"STEREOTRACK_CAUSE", "rights"}});
+  }
+}
+
+[[noreturn]] void refuse(const runtime::Missing& missing) {
+  throw std::runtime_error("realtime.mode = \"enforce\": " + missing.what + "; to grant it: " + missing.grant +
+                           "; or set realtime.mode = \"try\"");
+}
+
+std::string summary_of(const capture::SourceInfo& info, const config::Configuration& configuration,
+                       std::uint64_t session) {
+  char text[256];
+  (void)std::snprintf(text, sizeof text, "%s %dx%d at %.1f pairs/s, latency %.1f ms, preset %s, session %llu",
+                      info.name.c_str(), info.width, info.height,
+                      1.0 / std::chrono::duration<double>(info.period).count(), configuration.latency.output_ms,
+                      configuration.preset.c_str(), static_cast<unsigned long long>(session));
+  return text;
+}
+
+int make_lines_safe(const config::Configuration& configuration) {
+  bool all = true;
+  for (const gpio::SafeOutcome& outcome : gpio::set_lines_safe(signals::line_specs(configuration), "stereotrackd")) {
+    log(outcome.done ? LogLevel::kInfo : LogLevel::kError, outcome.text, {{"STEREOTRACK_CAUSE", "line"}});
+    all = all && outcome.done;
+  }
+  return all ? 0 : kFailed;
+}
+
+// SIGHUP. What is wrong changes nothing; what cannot change while it runs is named and stays.
+void reload(const Arguments& arguments, config::Configuration& running, double unit_m, daemon::Daemon& daemon) {
+  try {
+    const config::Loaded loaded = load_configuration(arguments.config, arguments.set);
+    const daemon::Difference difference = daemon::difference(running, loaded.configuration);
+    for (const std::string& key : difference.refused) {
+      log(LogLevel::kWarning, "reload: " + key + ": cannot change while the daemon runs, restart it",
+          {{"STEREOTRACK_CAUSE", "reload"}});
+    }
+    if (difference.plan) {
+      daemon.exchange(daemon::make_plan(loaded.configuration, unit_m));
+      daemon::take_plan_keys(loaded.configuration, running);
+    }
+    log(LogLevel::kInfo, std::string("reload: ") + (difference.plan ? "taken over" : "nothing to take over"),
+        {{"STEREOTRACK_CAUSE", "reload"}});
+  } catch (const std::exception& error) {
+    log(LogLevel::kError, std::string("reload: refused, the running configuration stays: ") + error.what(),
+        {{"STEREOTRACK_CAUSE", "reload"}});
+  }
+}
+
+// SIGUSR1.
+void record_now(const config::Configuration& configuration, daemon::Daemon& daemon) {
+  record::BlackBox* box = daemon.black_box();
+  if (box == nullptr || !configuration.record.on_signal) {
+    log(LogLevel::kWarning, "SIGUSR1: nothing is recorded: record.on or record.on_signal is false",
+        {{"STEREOTRACK_CAUSE", "record"}});
+    return;
+  }
+  box->trigger(record::kDemand);
+  log(LogLevel::kInfo, "SIGUSR1: recording", {{"STEREOTRACK_CAUSE", "record"}});
+}
+
+int run(const Arguments& arguments) {
+  Rig rig;
+  rig.loaded = load_configuration(arguments.config, arguments.set);
+  if (arguments.safe_lines) return make_lines_safe(rig.configuration());
+  config::Configuration configuration = rig.configuration();
+
+  daemon::Daemon::Parts parts;
+  parts.configuration = &configuration;
+  parts.source = open_source(rig);
+  parts.calibration = rig.calibration ? &*rig.calibration : nullptr;
+  parts.unit_m = rig.unit_m;
+  parts.plan = daemon::make_plan(configuration, rig.unit_m);
+  parts.program = std::string("stereotrackd ") + STEREOTRACK_VERSION;
+  if (!configuration.telemetry.key_file.empty()) {
+    parts.signer =
+        std::make_unique<telemetry::Signer>(telemetry::load_key_file(configuration.telemetry.key_file).front());
+  }
+  const capture::SourceInfo info = parts.source->info();
+  if (arguments.check) {
+    const daemon::Daemon daemon(std::move(parts));
+    std::cout << arguments.config << ": " << info.name << ' ' << info.width << 'x' << info.height << ' '
+              << (has_colour(info.format) ? "colour" : "grey") << ' ' << (info.stereo ? "stereo" : "mono")
+              << ", preset " << configuration.preset << ": configuration, calibration and source are fine\n";
+    print_memory(std::cout, daemon.memory());
+    return 0;
+  }
+
+  // Before lines and sockets are taken: a rig that is not granted what it needs must not look alive.
+  std::unique_ptr<runtime::RealTimeProcess> process;
+  std::vector<runtime::Missing> missing;
+  const bool enforce = configuration.realtime.mode == config::RealTimeMode::kEnforce;
+  if (configuration.realtime.mode != config::RealTimeMode::kOff) {
+    process = std::make_unique<runtime::RealTimeProcess>(
+        runtime::RealTimeProcess::Config{.deep_sleep = configuration.realtime.deep_sleep});
+    missing = process->missing();
+    if (enforce && !missing.empty()) refuse(missing.front());
+  }
+  const fs::path state = state_directory(configuration);
+  fs::create_directories(state);
+  if (configuration.record.on) fs::create_directories(configuration.record.directory);
+  parts.session = telemetry::next_session(state);
+  parts.lines = gpio::open_lines(signals::line_specs(configuration), "stereotrackd");
+
+  const std::uint64_t session = parts.session;
+  daemon::Daemon daemon(std::move(parts));
+  const daemon::Panic panic(daemon, (state / "last_states.txt").string());
+  daemon::Service service({.metrics = configuration.metrics,
+                           .session = session,
+                           .summary = summary_of(info, configuration, session),
+                           .reload = [&] { reload(arguments, configuration, rig.unit_m, daemon); },
+                           .record = [&] { record_now(configuration, daemon); }});
+  const std::vector<runtime::Missing> of_threads = daemon.start(configuration.realtime, !missing.empty());
+  if (enforce && !of_threads.empty()) refuse(of_threads.front());
+  missing.insert(missing.end(), of_threads.begin(), of_threads.end());
+  log_missing(missing);
+  service.run(daemon);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Tracks moving objects with a stereo rig, in real time.", "stereotrackd");
+  app.set_version_flag("--version", std::string("stereotrackd ") + STEREOTRACK_VERSION);
+  Arguments arguments;
+  app.add_option("--config", arguments.config, "configuration (TOML)")->required();
+  app.add_option("--set", arguments.set, "KEY=VALUE, wins over the file; may be given again")->allow_extra_args(false);
+  app.add_flag("--check-config", arguments.check,
+               "only checks configuration, calibration and source, and prints the memory by stage");
+  app.add_flag("--safe-lines", arguments.safe_lines,
+               "only drives all GPIO lines to their safe states, after a crash: ExecStopPost of the unit");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::cerr << "stereotrackd: " << error.what() << " (see stereotrackd --help)\n";
+    return kBadUsage;
+  }
+  try {
+    return run(arguments);
+  } catch (const config::Error& error) {
+    log(LogLevel::kError, error.what());
+    return kBadUsage;
+  } catch (const telemetry::EndpointError& error) {
+    log(LogLevel::kError, error.what());
+    return kBadUsage;
+  } catch (const telemetry::KeyFileError& error) {
+    log(LogLevel::kError, error.what());
+    return kBadUsage;
+  } catch (const std::exception& error) {
+    log(LogLevel::kError, error.what());
+    return kFailed;
+  }
+}

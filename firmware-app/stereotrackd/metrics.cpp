@@ -1,0 +1,165 @@
+#include "firmware-app/stereotrackd/metrics.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
+
+#include "firmware-app/stereotrackd/daemon.hpp"
+
+namespace stereotrack::daemon {
+
+namespace {
+
+/// Families of metrics, one after the other.
+class Text {
+ public:
+  void family(const char* name, const char* type, const char* help) {
+    append("# HELP stereotrack_%s %s\n# TYPE stereotrack_%s %s\n", name, help, name, type);
+    name_ = name;
+  }
+  void value(const char* labels, std::uint64_t value) {
+    append("stereotrack_%s%s %llu\n", name_, labels, static_cast<unsigned long long>(value));
+  }
+  void counter(const char* name, const char* help, std::uint64_t value_now) {
+    family(name, "counter", help);
+    value("", value_now);
+  }
+  void gauge(const char* name, const char* help, std::uint64_t value_now) {
+    family(name, "gauge", help);
+    value("", value_now);
+  }
+  void summary(const char* name, const char* help, const runtime::Histogram& histogram) {
+    family(name, "summary", help);
+    quantiles("", histogram);
+  }
+  /// `label`: NAME="VALUE",
+  void quantiles(const std::string& label, const runtime::Histogram& histogram) {
+    for (const double part : {0.5, 0.99, 0.999, 1.0}) {
+      const std::uint64_t ns = part < 1 ? histogram.percentile_ns(part) : histogram.max_ns();
+      append("stereotrack_%s{%squantile=\"%g\"} %.9f\n", name_, label.c_str(), part, static_cast<double>(ns) * 1e-9);
+    }
+    const std::string only = label.empty() ? "" : '{' + label.substr(0, label.size() - 1) + '}';
+    append("stereotrack_%s_sum%s %.9f\n", name_, only.c_str(), static_cast<double>(histogram.sum_ns()) * 1e-9);
+    append("stereotrack_%s_count%s %llu\n", name_, only.c_str(), static_cast<unsigned long long>(histogram.count()));
+  }
+  [[nodiscard]] std::string take() { return std::move(text_); }
+
+ private:
+  [[gnu::format(printf, 2, 3)]] void append(const char* format, ...) {
+    char line[512];
+    va_list values;
+    va_start(values, format);
+    const int size = std::vsnprintf(line, sizeof line, format, values);
+    va_end(values);
+    if (size > 0) text_.append(line, std::min(static_cast<std::size_t>(size), sizeof line - 1));
+  }
+
+  std::string text_;
+  const char* name_ = "";
+};
+
+}  // namespace
+
+std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
+  const Vitals& vitals = daemon.vitals();
+  const capture::FramePool::Counters pool = daemon.pool();
+  Text text;
+  text.gauge("session", "Number of this run.", session);
+  text.family("pairs_total", "counter", "Frame pairs by what became of them.");
+  text.value("{fate=\"captured\"}", pool.captured);
+  text.value("{fate=\"evicted\"}", pool.evicted);
+  text.value("{fate=\"skipped\"}", pool.skipped);
+  text.value("{fate=\"starved\"}", pool.starved);
+  text.value("{fate=\"refused\"}", vitals.frames_refused.get());
+  text.counter("frames_total", "Pairs that went through the pipeline.", vitals.frames.get());
+  text.gauge("pair_buffers_free_low", "Fewest free buffers of pairs.", pool.free_low);
+  text.gauge("pairs_waiting_high", "Most pairs that waited for the frame loop.", pool.waiting_high);
+  text.counter("notices_lost_total", "Pairs of which the publisher was not told.", daemon.lost_notices());
+
+  text.family("outputs_total", "counter", "Slots of the latency contract by how they ended, and what was refused.");
+  for (std::size_t i = 0; i < kScheduleCounters.size(); ++i) {
+    const std::string label = std::string("{cause=\"") + kScheduleCounters[i].name + "\"}";
+    text.value(label.c_str(), vitals.schedule[i].get());
+  }
+  text.gauge("targets", "Targets of the last message.", vitals.targets.get());
+  text.gauge("health", "What is wrong now, sum of telemetry Health bits.", vitals.health.get());
+  text.counter("clock_steps_total", "Times that capture times moved against the monotonic clock.",
+               vitals.clock_steps.get());
+  text.family("allocations_total", "counter", "Heap calls of real-time threads after warm-up.");
+  text.value("{thread=\"frames\"}", vitals.frame_allocations.get());
+  text.value("{thread=\"publisher\"}", vitals.publisher_allocations.get());
+
+  text.family("effort_left_out", "gauge", "1: frames do without it now.");
+  for (std::size_t i = 0; i < kEfforts; ++i) {
+    const auto effort = static_cast<Effort>(i);
+    const std::string label = std::string("{effort=\"") + to_string(effort) + "\"}";
+    text.value(label.c_str(), leaves_out(static_cast<EffortBits>(vitals.efforts_left_out.get()), effort) ? 1 : 0);
+  }
+  text.counter("efforts_shed_total", "Times that an effort was given up.", vitals.efforts_shed.get());
+  text.counter("effort_overruns_total", "Frames over their budget.", vitals.effort_overruns.get());
+  text.counter("effort_helpless_total", "Of these, with nothing left to give up.", vitals.effort_helpless.get());
+
+  text.family("telemetry_total", "counter", "Datagrams, times destinations.");
+  text.value("{fate=\"sent\"}", vitals.telemetry_sent.get());
+  text.value("{fate=\"dropped\"}", vitals.telemetry_dropped.get());
+  text.value("{fate=\"failed\"}", vitals.telemetry_failed.get());
+  text.counter("reloads_total", "Configurations taken over while running.", vitals.reloads.get());
+
+  if (daemon.lines().size() > 0) {
+    text.family("line_active", "gauge", "1: active.");
+    for (std::size_t i = 0; i < daemon.lines().size(); ++i) {
+      const std::string label = "{line=\"" + gpio::to_string(daemon.lines().name(i)) + "\"}";
+      text.value(label.c_str(), daemon.lines().read(i).active ? 1 : 0);
+    }
+    text.family("line_transitions_total", "counter", "Changes of the line.");
+    for (std::size_t i = 0; i < daemon.lines().size(); ++i) {
+      const std::string label = "{line=\"" + gpio::to_string(daemon.lines().name(i)) + "\"}";
+      text.value(label.c_str(), daemon.lines().read(i).transitions);
+    }
+  }
+  text.counter("lines_failed_total", "Drives of lines that were refused.", vitals.lines_failed.get());
+
+  if (const record::BlackBox* box = daemon.black_box()) {
+    const record::BlackBox::Counters& counters = box->counters();
+    text.family("recordings_total", "counter", "Recordings by what became of them.");
+    text.value("{fate=\"written\"}", counters.recordings.load());
+    text.value("{fate=\"failed\"}", counters.recordings_failed.load());
+    text.value("{fate=\"dropped\"}", counters.triggers_dropped.load());
+    text.value("{fate=\"merged\"}", counters.merged.load());
+    text.counter("recorder_frames_dropped_total", "Frames not kept: their memory was still being written.",
+                 counters.frames_dropped.load());
+    text.family("keyframes_total", "counter", "Keyframes of the pipeline's state.");
+    text.value("{fate=\"whole\"}", counters.keyframes.load());
+    text.value("{fate=\"given_up\"}", counters.keyframes_given_up.load());
+  }
+
+  text.summary("compute_seconds", "Time that the pipeline takes for a pair.", vitals.compute);
+  text.summary("frame_wake_up_seconds", "From the capture of a pair to the beginning of its computation.",
+               vitals.frame_wake_up);
+  text.summary("capture_to_result_seconds", "From the capture of a pair to its result.", vitals.capture_to_result);
+  text.summary("publisher_wake_up_seconds", "How late the publisher woke.", vitals.publisher_wake_up);
+  text.summary("send_error_seconds", "Distance of sending from capture + latency.output_ms.", vitals.send_error);
+  text.summary("line_set_seconds", "From capture + latency.output_ms to the setting of the lines.", vitals.line_set);
+  text.summary("capture_to_send_seconds", "From the capture of a pair to sending.", vitals.capture_to_send);
+  text.family("stage_seconds", "summary", "Time that each stage takes.");
+  for (std::size_t i = 0; i < kStages; ++i) {
+    text.quantiles(std::string("stage=\"") + to_string(static_cast<Stage>(i)) + "\",", vitals.stages[i]);
+  }
+  return text.take();
+}
+
+bool write_metrics_file(const std::string& path, const std::string& text) {
+  const std::string part = path + ".part";
+  const int fd = open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) return false;
+  const bool whole = write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  const bool closed = close(fd) == 0;
+  if (whole && closed && std::rename(part.c_str(), path.c_str()) == 0) return true;
+  (void)unlink(part.c_str());
+  return false;
+}
+
+}  // namespace stereotrack::daemon

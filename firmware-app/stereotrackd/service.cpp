@@ -1,0 +1,179 @@
+#include "firmware-app/stereotrackd/service.hpp"
+
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <systemd/sd-daemon.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <stdexcept>
+
+#include "firmware-app/stereotrackd/log.hpp"
+#include "firmware-app/stereotrackd/metrics.hpp"
+
+namespace stereotrack::daemon {
+
+namespace {
+
+constexpr std::chrono::milliseconds kRound{100};
+
+std::string efforts_text(std::uint64_t bits) {
+  std::string text;
+  for (std::size_t i = 0; i < kEfforts; ++i) {
+    const auto effort = static_cast<Effort>(i);
+    if (!leaves_out(static_cast<EffortBits>(bits), effort)) continue;
+    text += (text.empty() ? "" : ", ") + std::string(to_string(effort));
+  }
+  return text.empty() ? "nothing" : text;
+}
+
+}  // namespace
+
+Service::Service(const Config& config) : config_(config) {
+  sigset_t wanted;
+  sigemptyset(&wanted);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1}) sigaddset(&wanted, signal);
+  // A telemetry or metrics peer that goes away must not end the daemon.
+  (void)std::signal(SIGPIPE, SIG_IGN);
+  if (pthread_sigmask(SIG_BLOCK, &wanted, nullptr) != 0) throw std::runtime_error("signals cannot be blocked");
+  signals_ = signalfd(-1, &wanted, SFD_CLOEXEC | SFD_NONBLOCK);
+  if (signals_ < 0) throw std::runtime_error(std::string("signals cannot be read: ") + std::strerror(errno));
+  if (!config_.metrics.listen.empty()) server_ = std::make_unique<MetricsServer>(config_.metrics.listen);
+  std::uint64_t us = 0;
+  if (sd_watchdog_enabled(0, &us) > 0) watchdog_ = std::chrono::microseconds(us);
+}
+
+Service::~Service() {
+  if (signals_ >= 0) (void)close(signals_);
+}
+
+bool Service::take_signals() {
+  signalfd_siginfo info{};
+  while (read(signals_, &info, sizeof info) == sizeof info) {
+    if (info.ssi_signo == SIGUSR1) {
+      if (config_.record) config_.record();
+      continue;
+    }
+    if (info.ssi_signo != SIGHUP) {
+      log(LogLevel::kInfo, std::string(strsignal(static_cast<int>(info.ssi_signo))) + ": ending");
+      return false;
+    }
+    if (!config_.reload) continue;
+    (void)sd_notify(0, "RELOADING=1");
+    config_.reload();
+    (void)sd_notify(0, "READY=1");
+  }
+  return true;
+}
+
+void Service::feed_watchdog(const Daemon& daemon) {
+  if (!watchdog_ || Clock::now() - fed_ < *watchdog_ / 3) return;
+  const Vitals& vitals = daemon.vitals();
+  const std::array<std::uint64_t, 3> now{vitals.capture_beats.get(), vitals.frame_beats.get(),
+                                         vitals.publisher_beats.get()};
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (now[i] == beats_[i]) return;  // not fed: systemd restarts the daemon if that goes on
+  }
+  beats_ = now;
+  fed_ = Clock::now();
+  (void)sd_notify(0, "WATCHDOG=1");
+}
+
+void Service::log_changes(const Daemon& daemon) {
+  const Vitals& vitals = daemon.vitals();
+  const auto changed = [](std::uint64_t& seen, std::uint64_t now) {
+    const std::uint64_t by = now - seen;
+    seen = now;
+    return by;
+  };
+  for (std::size_t i = 0; i < kScheduleCounters.size(); ++i) {
+    const std::uint64_t by = changed(schedule_[i], vitals.schedule[i].get());
+    const std::string name = kScheduleCounters[i].name;
+    if (by == 0 || name == "on_time") continue;
+    log(LogLevel::kWarning, "outputs: " + std::to_string(by) + ' ' + name + " in the last second",
+        {{"STEREOTRACK_CAUSE", name}, {"STEREOTRACK_COUNT", std::to_string(by)}});
+  }
+  if (const std::uint64_t now = vitals.efforts_left_out.get(); now != efforts_) {
+    efforts_ = now;
+    log(LogLevel::kNotice, "frames leave out: " + efforts_text(now), {{"STEREOTRACK_CAUSE", "effort"}});
+  }
+  if (const std::uint64_t by =
+          changed(allocations_, vitals.frame_allocations.get() + vitals.publisher_allocations.get());
+      by > 0) {
+    log(LogLevel::kError, std::to_string(by) + " heap calls in real-time threads", {{"STEREOTRACK_CAUSE", "heap"}});
+  }
+  if (const std::uint64_t by = changed(lines_failed_, vitals.lines_failed.get()); by > 0) {
+    log(LogLevel::kError, "GPIO lines could not be driven: " + std::string(std::strerror(daemon.lines().last_error())),
+        {{"STEREOTRACK_CAUSE", "line"}});
+  }
+  if (const std::uint64_t by = changed(telemetry_failed_, vitals.telemetry_failed.get()); by > 0) {
+    log(LogLevel::kWarning, std::to_string(by) + " datagrams found no way in the last second",
+        {{"STEREOTRACK_CAUSE", "telemetry"}});
+  }
+  if (const record::BlackBox* box = daemon.black_box()) {
+    const record::BlackBox::Counters& counters = box->counters();
+    const std::uint64_t written = changed(recordings_, counters.recordings.load());
+    if (written > 0) {
+      log(LogLevel::kNotice, std::to_string(written) + " recording written", {{"STEREOTRACK_CAUSE", "record"}});
+    }
+    const std::uint64_t lost =
+        changed(recordings_lost_, counters.recordings_failed.load() + counters.triggers_dropped.load());
+    if (lost > 0) {
+      log(LogLevel::kWarning, std::to_string(lost) + " recordings were dropped: the disk is full, slow or not writable",
+          {{"STEREOTRACK_CAUSE", "record"}});
+    }
+  }
+  if (const std::uint64_t by = changed(frames_refused_, vitals.frames_refused.get()); by > 0) {
+    log(LogLevel::kError, std::to_string(by) + " pairs were refused by the pipeline in the last second",
+        {{"STEREOTRACK_CAUSE", "pipeline"}});
+  }
+}
+
+void Service::every_second(const Daemon& daemon) {
+  log_changes(daemon);
+  const Vitals& vitals = daemon.vitals();
+  (void)sd_notifyf(0, "STATUS=%s; %llu pairs, %llu targets, compute p99 %.1f ms, send error p99 %.0f us, health %llu",
+                   config_.summary.c_str(), static_cast<unsigned long long>(vitals.frames.get()),
+                   static_cast<unsigned long long>(vitals.targets.get()),
+                   static_cast<double>(vitals.compute.percentile_ns(0.99)) * 1e-6,
+                   static_cast<double>(vitals.send_error.percentile_ns(0.99)) * 1e-3,
+                   static_cast<unsigned long long>(vitals.health.get()));
+  if (!server_ && config_.metrics.file.empty()) return;
+  std::string text = metrics_text(daemon, config_.session);
+  if (!config_.metrics.file.empty()) {
+    const bool written = write_metrics_file(config_.metrics.file, text);
+    if (!written && !metrics_file_failed_) {
+      log(LogLevel::kWarning, "metrics.file " + config_.metrics.file + ": " + std::strerror(errno) +
+                                  ": goes on without, and tries again every second");
+    }
+    metrics_file_failed_ = !written;
+  }
+  if (server_) server_->show(std::move(text));
+}
+
+void Service::run(Daemon& daemon) {
+  if (server_) {
+    server_->show(metrics_text(daemon, config_.session));
+    log(LogLevel::kInfo, "figures at http://" + server_->where() + "/metrics");
+  }
+  log(LogLevel::kInfo, config_.summary);
+  (void)sd_notify(0, "READY=1");
+  Clock::time_point next = Clock::now();
+  while (take_signals() && !daemon.is_over()) {
+    feed_watchdog(daemon);
+    if (Clock::now() >= next) {
+      every_second(daemon);
+      next = std::max(next + std::chrono::seconds(1), Clock::now());
+    }
+    pollfd ready{signals_, POLLIN, 0};
+    (void)poll(&ready, 1, static_cast<int>(kRound.count()));
+  }
+  (void)sd_notify(0, "STOPPING=1");
+  daemon.stop();
+  every_second(daemon);
+  if (const std::string failure = daemon.failure(); !failure.empty()) throw std::runtime_error(failure);
+}
+
+}  // namespace stereotrack::daemon

@@ -1,0 +1,152 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "config/load.hpp"
+#include "drivers/capture/film/film.hpp"
+#include "drivers/telemetry/receiver.hpp"
+#include "drivers/telemetry/udp_listener.hpp"
+#include "drivers/telemetry/udp_sender.hpp"
+#include "firmware-app/stereotrackd/daemon.hpp"
+#include "tests/support/moving_scene.hpp"
+
+namespace stereotrack::test {
+
+/// MovingScene as a source, so many pairs from `first` on; those in `missing` cannot be read.
+class SceneSource final : public capture::FrameSource {
+ public:
+  SceneSource(int first, int pairs, std::chrono::nanoseconds period, std::vector<int> missing = {})
+      : scene_(kSceneFormats[0]), first_(first), pairs_(pairs), missing_(std::move(missing)) {
+    info_.name = "moving scene";
+    info_.width = MovingScene::kWidth;
+    info_.height = MovingScene::kHeight;
+    info_.format = PixelFormat::kBgr8;
+    info_.period = period;
+  }
+  [[nodiscard]] const capture::SourceInfo& info() const noexcept override { return info_; }
+  [[nodiscard]] capture::Next next(FramePair& out) noexcept override {
+    if (done_ == pairs_) return capture::Next::kEnd;
+    out = scene_.pair(first_ + done_, true);
+    out.ordinal = static_cast<std::uint64_t>(++done_);
+    out.capture_time = CaptureTime(info_.period * done_);
+    const bool is_missing = std::find(missing_.begin(), missing_.end(), done_) != missing_.end();
+    return is_missing ? capture::Next::kSkipped : capture::Next::kPair;
+  }
+  [[nodiscard]] const std::string& skip_reason() const noexcept override { return info_.name; }
+  void skip_to(std::uint64_t) noexcept override {}
+
+ private:
+  MovingScene scene_;
+  capture::SourceInfo info_;
+  int first_;
+  int pairs_;
+  std::vector<int> missing_;
+  int done_ = 0;
+};
+
+[[nodiscard]] inline std::unique_ptr<capture::Film> film_of_scene(
+    int first, int pairs, std::chrono::nanoseconds period, capture::Film::Repeat repeat = capture::Film::Repeat::kOnce,
+    std::vector<int> missing = {}) {
+  SceneSource source(first, pairs, period, std::move(missing));
+  return std::make_unique<capture::Film>(source, capture::Film::Config{.repeat = repeat});
+}
+
+[[nodiscard]] inline config::Configuration configured(const std::vector<std::string>& set) {
+  std::vector<config::Layer> layers;
+  for (const std::string& entry : set) layers.push_back(config::override_layer(entry));
+  return config::load(layers).configuration;
+}
+
+/// What came over a real socket.
+class Ear {
+ public:
+  Ear() : listener_(telemetry::parse_endpoint("127.0.0.1:0", true)) {}
+
+  [[nodiscard]] std::vector<telemetry::Endpoint> here() const { return {listener_.local()}; }
+
+  /// Takes what waits.
+  void listen() {
+    std::array<std::byte, 2048> buffer{};
+    for (std::ptrdiff_t size = listener_.receive(buffer); size >= 0; size = listener_.receive(buffer)) {
+      const auto outcome = receiver_.accept(std::span(buffer).first(static_cast<std::size_t>(size)));
+      if (outcome == telemetry::Outcome::kPair) pairs_.push_back(receiver_.pair());
+      if (outcome == telemetry::Outcome::kStatus) statuses_.push_back(*receiver_.datagram().status);
+    }
+  }
+
+  [[nodiscard]] const std::vector<telemetry::Pair>& pairs() const { return pairs_; }
+  [[nodiscard]] const std::vector<telemetry::Status>& statuses() const { return statuses_; }
+  [[nodiscard]] const telemetry::Receiver& receiver() const { return receiver_; }
+
+ private:
+  telemetry::UdpListener listener_;
+  telemetry::Receiver receiver_;
+  std::vector<telemetry::Pair> pairs_;
+  std::vector<telemetry::Status> statuses_;
+};
+
+[[nodiscard]] inline signals::SignalRules rules_of(std::vector<signals::Signal> wanted) {
+  signals::SignalRules::Config config;
+  for (const signals::Signal& signal : wanted) (void)config.signals.push(signal);
+  config.unit_m = 1;
+  config.stale_after = std::chrono::milliseconds(500);
+  return *signals::SignalRules::create(config);
+}
+
+/// A daemon in this process: real threads, real time, real sockets, simulated lines.
+struct LiveRig {
+  explicit LiveRig(std::unique_ptr<capture::LiveSource> source, const std::vector<std::string>& set = {},
+                   StageObserver also = {}, std::vector<gpio::LineSpec> lines = {},
+                   std::vector<signals::Signal> wanted = {})
+      : configuration(configured(set)), calibration(MovingScene::calibration()) {
+    daemon::Daemon::Parts parts;
+    parts.configuration = &configuration;
+    parts.calibration = &calibration;
+    parts.unit_m = 1;
+    parts.source = std::move(source);
+    parts.plan = std::make_unique<daemon::Plan>(
+        daemon::Plan{std::make_unique<telemetry::UdpSender>(ear.here()), rules_of(std::move(wanted)), 0});
+    parts.lines = gpio::open_lines(lines, "test");
+    parts.session = 3;
+    parts.also = also;
+    daemon = std::make_unique<daemon::Daemon>(std::move(parts));
+  }
+
+  /// Runs until the source is over, or `enough` says so.
+  void run(const std::function<bool()>& enough = [] { return false; }) {
+    config::RealTimeConfig off = configuration.realtime;
+    off.mode = config::RealTimeMode::kOff;
+    (void)daemon->start(off, false);
+    while (!daemon->is_over() && !enough()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      ear.listen();
+    }
+    daemon->stop();
+    ear.listen();
+  }
+
+  [[nodiscard]] std::uint64_t outputs(const std::string& name) const {
+    for (std::size_t i = 0; i < daemon::kScheduleCounters.size(); ++i) {
+      if (name == daemon::kScheduleCounters[i].name) return daemon->vitals().schedule[i].get();
+    }
+    ADD_FAILURE() << name << " is no counter";
+    return 0;
+  }
+
+  config::Configuration configuration;
+  StereoCalibration calibration;
+  Ear ear;
+  std::unique_ptr<daemon::Daemon> daemon;
+};
+
+}  // namespace stereotrack::test
