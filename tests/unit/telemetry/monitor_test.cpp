@@ -159,6 +159,15 @@ TEST(Monitor, WhatALiveRigAddsIsShown) {
   EXPECT_THAT(run.messages, HasSubstr("signed with key 3, which is not checked: give --key-file\n"));
 }
 
+TEST(Monitor, AFlagWithoutANameIsShownAsANumber) {
+  telemetry::Encoder encoder(telemetry::kGoldenConfig);
+  telemetry::Message message;
+  message.flags = telemetry::kStateAtOutput | 0x80000U;
+  std::vector<Bytes> all;
+  for (int i = 0; i < 2000; ++i) all.push_back(telemetry::encode(encoder, message)[0]);
+  EXPECT_THAT(run_with({.count = 1}, all).out, HasSubstr("flags state-at-output,0x80000\n"));
+}
+
 TEST(Monitor, JsonOfALiveRigHasTheNamesOfTheSchema) {
   const Outcome run = run_with({.json = true, .count = 3}, live_stream(2000));
   EXPECT_EQ(run.exit_code, 0);
