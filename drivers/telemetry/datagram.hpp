@@ -28,10 +28,12 @@ enum Flag : std::uint32_t {
   kLightChange = 8,
   kFramesSkippedBefore = 16,
   kLate = 32,
-  kPairMissing = 64,   ///< no pair came, the slot is the period's
-  kPredicted = 128,    ///< its result was not there in time: an older state, predicted
-  kEffortShed = 256,   ///< see Live::efforts_shed
-  kClockStepped = 512  ///< of the capture clock, since the message before
+  kPairMissing = 64,    ///< no pair came, the slot is the period's
+  kPredicted = 128,     ///< its result was not there in time: an older state, predicted
+  kEffortShed = 256,    ///< see Live::efforts_shed
+  kClockStepped = 512,  ///< of the capture clock, since the message before
+  kStateAtOutput =
+      1024,  ///< positions, velocities, covariances are predicted to when the message is due, not of capture
 };
 
 /// Bits of Live::health and Status::health: what is wrong now.

@@ -31,7 +31,8 @@ static_assert(same(stereotrack_Flag_FLAG_MONO, kMono) && same(stereotrack_Flag_F
               same(stereotrack_Flag_FLAG_LATE, kLate) && same(stereotrack_Flag_FLAG_PAIR_MISSING, kPairMissing) &&
               same(stereotrack_Flag_FLAG_PREDICTED, kPredicted) &&
               same(stereotrack_Flag_FLAG_EFFORT_SHED, kEffortShed) &&
-              same(stereotrack_Flag_FLAG_CLOCK_STEPPED, kClockStepped));
+              same(stereotrack_Flag_FLAG_CLOCK_STEPPED, kClockStepped) &&
+              same(stereotrack_Flag_FLAG_STATE_AT_OUTPUT, kStateAtOutput));
 constexpr bool same(std::uint32_t schema, Health ours) noexcept { return schema == ours; }
 static_assert(same(stereotrack_Health_HEALTH_NO_PAIRS, kHealthNoPairs) &&
               same(stereotrack_Health_HEALTH_LEFT_SILENT, kHealthLeftSilent) &&

@@ -66,7 +66,7 @@ std::string bit_names(std::uint32_t bits, std::span<const BitName> names) {
 }
 
 std::string flag_names(std::uint32_t flags) {
-  static constexpr std::array<BitName, 10> kNames{{
+  static constexpr std::array<BitName, 11> kNames{{
       {telemetry::kMono, "mono"},
       {telemetry::kNoColour, "no-colour"},
       {telemetry::kBackgroundLearning, "learning"},
@@ -77,6 +77,7 @@ std::string flag_names(std::uint32_t flags) {
       {telemetry::kPredicted, "predicted"},
       {telemetry::kEffortShed, "effort-shed"},
       {telemetry::kClockStepped, "clock-stepped"},
+      {telemetry::kStateAtOutput, "state-at-output"},
   }};
   return bit_names(flags, kNames);
 }

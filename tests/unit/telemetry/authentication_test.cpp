@@ -262,6 +262,7 @@ TEST(Authentication, WhatComesInAnotherOrderWithinTheWindowIsTaken) {
   Receiver receiver({kGoldenKey});
   SignedStream stream(1);
   std::vector<std::vector<Bytes>> messages;
+  messages.reserve(6);
   for (int i = 0; i < 6; ++i) messages.push_back(stream.message(9));
   for (const int i : {0, 5, 2, 4, 1, 3}) {
     for (const int part : {1, 0}) EXPECT_EQ(verdict(receiver, messages[i][part]), "taken") << i;
@@ -286,6 +287,7 @@ TEST(Authentication, AnOlderSessionIsRefusedAndAnotherRigsDoesNotCount) {
 TEST(Authentication, ReplaysAcrossMoreStreamsThanAreFollowedAreRefusedStill) {
   Receiver receiver({kGoldenKey});
   std::vector<Bytes> first;
+  first.reserve(ReplayGuard::kRigs);
   for (std::uint32_t rig = 0; rig < ReplayGuard::kRigs; ++rig) {
     first.push_back(SignedStream(1, rig).message()[0]);
     ASSERT_EQ(verdict(receiver, first.back()), "taken") << rig;

@@ -135,6 +135,7 @@ std::vector<Bytes> live_stream(int count, std::uint64_t session = 7, telemetry::
   telemetry::Encoder encoder({.rig = 9, .session = session, .signer = &signer});
   const auto list = telemetry::tracks(1);
   std::vector<Bytes> all;
+  all.reserve(2 * static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     all.push_back(telemetry::encode(encoder, telemetry::golden_live_message(list))[0]);
     all.push_back(telemetry::encode_status(encoder, telemetry::golden_status(), telemetry::golden_live_without_pair()));
@@ -157,6 +158,16 @@ TEST(Monitor, WhatALiveRigAddsIsShown) {
                                  "shed level_set  dropped telemetry 47 recording 25 lines 26\n"));
   EXPECT_THAT(run.out, testing::ContainsRegex("received 3 pairs and [23] statuses in [56] datagrams, lost 0"));
   EXPECT_THAT(run.messages, HasSubstr("signed with key 3, which is not checked: give --key-file\n"));
+}
+
+TEST(Monitor, AFlagWithoutANameIsShownAsANumber) {
+  telemetry::Encoder encoder(telemetry::kGoldenConfig);
+  telemetry::Message message;
+  message.flags = telemetry::kStateAtOutput | 0x80000U;
+  std::vector<Bytes> all;
+  all.reserve(2000);
+  for (int i = 0; i < 2000; ++i) all.push_back(telemetry::encode(encoder, message)[0]);
+  EXPECT_THAT(run_with({.count = 1}, all).out, HasSubstr("flags state-at-output,0x80000\n"));
 }
 
 TEST(Monitor, JsonOfALiveRigHasTheNamesOfTheSchema) {
@@ -186,6 +197,7 @@ TEST(Monitor, LiveTableShowsHealthAndStatus) {
 TEST(Monitor, StatusesAloneAreASignOfLifeAndNoPairs) {
   std::vector<Bytes> statuses;
   const auto all = live_stream(2000);
+  statuses.reserve(all.size() / 2);
   for (std::size_t i = 1; i < all.size(); i += 2) statuses.push_back(all[i]);
   const Outcome run = run_with({.count = 1, .timeout_s = 0.15}, statuses, 500);
   EXPECT_EQ(run.exit_code, 0) << "ended by the signal, not by the time-out";

@@ -13,7 +13,6 @@
 namespace stereotrack::telemetry {
 namespace {
 
-using testing::ElementsAre;
 using testing::HasSubstr;
 using Verdict = ReplayGuard::Verdict;
 
