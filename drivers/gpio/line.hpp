@@ -38,6 +38,7 @@ struct LineSpec {
   LineName name;
   bool active_low = false;
   bool safe = false;  ///< active or not: driven from the request on, and again before the line is let go
+  friend bool operator==(const LineSpec&, const LineSpec&) = default;
 };
 
 /// Outputs of one chip that were requested together, in the shape of libgpiod 2: what changes together leaves in one
