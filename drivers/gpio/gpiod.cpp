@@ -22,17 +22,17 @@ namespace fs = std::filesystem;
   throw std::runtime_error("GPIO line " + to_string(name) + ": " + what);
 }
 
-/// The group that may use a chip; "root" is a chip for which no udev rule has been written.
+/// The group that may use a chip; empty: only root may, no udev rule has been written.
 std::string group_of(const std::string& path) {
   struct stat facts {};
-  if (::stat(path.c_str(), &facts) != 0) return "root";
+  if (::stat(path.c_str(), &facts) != 0 || facts.st_gid == 0) return {};
   const group* const entry = ::getgrgid(facts.st_gid);
   return entry == nullptr ? std::to_string(facts.st_gid) : entry->gr_name;
 }
 
 std::string no_permission(const std::string& path) {
   const std::string group = group_of(path);
-  if (group != "root") return "no permission for " + path + ": add the program's user to the group " + group;
+  if (!group.empty()) return "no permission for " + path + ": add the program's user to the group " + group;
   return "no permission for " + path +
          R"(: give it a group by a udev rule, SUBSYSTEM=="gpio", GROUP="gpio", MODE="0660", and put the program's user )"
          "into it";
@@ -127,7 +127,8 @@ std::unique_ptr<LineRequest> request(const std::string& path, std::span<const Wa
   if (!chip) refuse(lines.front().name, open_refusal(path, errno));
   if (auto made = Chip::request(std::move(chip), lines, user)) return made;
   const int error = errno;
-  // Which of the lines it was: the one that is refused by itself, too.
+  // Which of the lines it was: the one that is refused by itself, too. The others show their safe states meanwhile, as
+  // they would have with the request.
   for (const WantedLine& line : lines) {
     auto again = Chip::open(path);
     if (again && !Chip::request(std::move(again), {&line, 1}, user)) {

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -176,6 +178,20 @@ TEST(SetUp, WhatLoadTakesForALineTheDriverTakesToo) {
     }
     EXPECT_EQ(loads, parses) << '"' << line << '"';
   }
+}
+
+TEST(SetUp, ExamplesOfThePageAreRight) {
+  std::ifstream page(STEREOTRACK_SOURCE_DIR "/docs/SIGNALS.md");
+  const std::string text{std::istreambuf_iterator<char>(page), {}};
+  const std::string fence = "```toml\n";
+  std::size_t examples = 0;
+  for (std::size_t at = text.find(fence); at != text.npos; at = text.find(fence, at + 1)) {
+    const std::size_t begin = at + fence.size();
+    const config::Configuration example = said(text.substr(begin, text.find("```", begin) - begin));
+    EXPECT_EQ(make_rules(example, 1, kStale).size(), line_specs(example).size());
+    ++examples;
+  }
+  EXPECT_GE(examples, 1U);
 }
 
 TEST(SetUp, FromTheFileToThePin) {
