@@ -86,7 +86,8 @@ telemetry::Encoder::Config identity_of(const Rig& rig) {
   if (rig.recording == nullptr || !rig.recording->about().exact) return config;
   config.rig = rig.recording->about().rig;
   config.session = rig.recording->about().session;
-  if (const record::OutputNote* first = rig.recording->first_output()) config.sequence = first->sequence - 1;
+  const record::OutputNote* first = rig.recording->first_output();
+  if (first != nullptr && first->sequence > 0) config.sequence = first->sequence - 1;
   return config;
 }
 
