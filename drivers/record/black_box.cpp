@@ -107,7 +107,7 @@ BlackBox::BlackBox(Config config, Run run, const Pipeline& pipeline)
   frames_after_ = frames_in(config_.seconds_after);
   slots_ = std::max<std::uint64_t>(frames_in(config_.seconds) + frames_after_, 1) + kSpareSlots;
   keyframe_every_ = std::max<std::uint64_t>(frames_in(config_.seconds) / 2, 1);
-  memory_ = arena_.array<std::byte>(slots_ * slot_bytes_);
+  memory_ = arena_.array<std::byte>(static_cast<std::size_t>(slots_) * slot_bytes_);
   if (config_.reduce > 1) scratch_ = arena_.array<std::byte>(views * raw_bytes_);
   if (is_exact()) {
     const std::size_t block = sizeof(KeyframeMeta) + pipeline.state_bytes();
@@ -242,10 +242,15 @@ int BlackBox::oldest_keyframe(std::uint64_t first) const noexcept {
   return found;
 }
 
+// Of a recording that ends before `last`.
+std::uint64_t BlackBox::first_kept(std::uint64_t last) const noexcept {
+  const std::uint64_t most = slots_ - kSpareSlots;
+  return last > most ? last - most : 0;
+}
+
 void BlackBox::freeze() noexcept {
   Frozen frozen;
-  const std::uint64_t most = slots_ - kSpareSlots;
-  frozen.first = next_ > most ? next_ - most : 0;
+  frozen.first = first_kept(next_);
   frozen.last = next_;
   frozen.causes = causes_;
   frozen.keyframe = oldest_keyframe(std::max(frozen.first, row_begin_));
@@ -265,7 +270,7 @@ bool BlackBox::keyframe_step(const Pipeline& pipeline) noexcept {
   if (copying_ < 0) {
     if (next_ < keyframe_due_) return false;
     // While the seconds after a trigger run, a newer keyframe would take the place of the one that is wanted.
-    if (causes_ != 0 && oldest_keyframe(row_begin_) >= 0) return false;
+    if (causes_ != 0 && oldest_keyframe(std::max(first_kept(next_ + after_left_), row_begin_)) >= 0) return false;
     (void)is_free(next_);
     // The oldest of those that are not frozen.
     for (int i = 0; i < kKeyframes; ++i) {

@@ -149,6 +149,7 @@ class BlackBox {
   void take_triggers() noexcept;
   void count_down() noexcept;
   void freeze() noexcept;
+  [[nodiscard]] std::uint64_t first_kept(std::uint64_t last) const noexcept;
   [[nodiscard]] int oldest_keyframe(std::uint64_t first) const noexcept;
   void reduce_into(std::span<std::byte> slot) const noexcept;
   void take_notes() noexcept;

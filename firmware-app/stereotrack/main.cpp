@@ -22,9 +22,9 @@ constexpr int kBadUsage = 2;
 
 void add_rig_options(CLI::App& command, stereotrack::RigArguments& rig) {
   command
-      .add_option(
-          "source", rig.source,
-          "mav0 folder, KITTI folder, folder with left/ right/, sbs:FILE, LEFT,RIGHT, mono:PATH or synthetic:NAME")
+      .add_option("source", rig.source,
+                  "mav0 folder, KITTI folder, folder with left/ right/, sbs:FILE, LEFT,RIGHT, mono:PATH, FILE.strec or "
+                  "synthetic:NAME")
       ->required();
   command.add_option("--calibration", rig.calibration, "calibration file; else that of the source's folder");
   command.add_option("--config", rig.config, "configuration (TOML); else stereotrack.toml of the source's folder");

@@ -88,7 +88,8 @@ telemetry::Encoder::Config identity_of(const Rig& rig) {
   if (rig.recording == nullptr || !rig.recording->about().exact) return config;
   config.rig = rig.recording->about().rig;
   config.session = rig.recording->about().session;
-  if (!rig.recording->outputs().empty()) config.sequence = rig.recording->outputs().front().sequence - 1;
+  const std::span<const record::OutputNote> outputs = rig.recording->outputs();
+  if (!outputs.empty() && outputs.front().sequence > 0) config.sequence = outputs.front().sequence - 1;
   return config;
 }
 

@@ -75,6 +75,8 @@ class Program {
     (void)waitpid(pid_, nullptr, 0);
   }
 
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }
+
   /// What it has written to stderr so far.
   [[nodiscard]] std::string err_so_far() const { return read_text(folder_ / "err"); }
 

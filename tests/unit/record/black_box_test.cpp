@@ -198,6 +198,41 @@ TEST(BlackBox, SlowDiskCostsFramesAndTriggersOfTheNextRecordingWhichIsExactAgain
   EXPECT_GE(rig.replay(rig.box().last_recording()), 15);
 }
 
+TEST(BlackBox, LongSecondsAfterDoNotCostTheSecondsBefore) {
+  const TempDir folder;
+  BlackBox::Config config;
+  config.seconds = 20 / kFramesASecond;
+  config.seconds_after = 60 / kFramesASecond;
+  Rig rig(robust(), folder.path(), config);
+  for (int ordinal = 1; ordinal <= 110; ++ordinal) {
+    rig.step(ordinal);
+    if (ordinal == 45) rig.box().trigger(kDeadlineMiss);
+  }
+  rig.serve();
+  EXPECT_GE(rig.replay(rig.box().last_recording()), 10 + 60);
+}
+
+// What the first recording gave back belongs to the second, too, as long as it is in memory.
+TEST(BlackBox, RecordingsThatOverlapAreBothExact) {
+  const TempDir folder;
+  Rig rig(robust(), folder.path());
+  int ordinal = 1;
+  const auto run_to = [&](int last) {
+    for (; ordinal <= last; ++ordinal) rig.step(ordinal);
+  };
+  run_to(40);
+  rig.box().trigger(kDeadlineMiss);
+  run_to(50);
+  rig.serve();
+  const std::string first = rig.box().last_recording();
+  rig.box().trigger(kDeadlineMiss);
+  run_to(80);  // long after it was frozen
+  rig.serve();
+  EXPECT_EQ(rig.counters().recordings, 2U);
+  EXPECT_GE(rig.replay(first), 15);
+  EXPECT_GE(rig.replay(rig.box().last_recording()), 15);
+}
+
 // Each frame is given back once it is written: the next recording fills up meanwhile.
 TEST(BlackBox, FramesAreKeptAgainWhileARecordingIsStillWritten) {
   const TempDir folder;
