@@ -20,7 +20,7 @@ enum class Repeat : unsigned char {
 struct SourceConfig {
   std::string name;                 ///< synthetic:NAME; stereotrackd alone, stereotrack is told on the command line
   Repeat repeat = Repeat::kBounce;  ///< stereotrackd alone
-  int memory_mb = 1024;             ///< most that a film may take [MB]; stereotrackd alone
+  int memory_mb = 2048;             ///< most that a film may take [MB]; stereotrackd alone
   double fps = 30.0;                ///< pairs per second, used only where the source itself has no times [1/s]
   bool flip = false;                ///< both views stand on their head: turn them top to bottom
   bool swap = false;                ///< what the source calls left is the right view

@@ -130,7 +130,10 @@ Daemon::Daemon(Parts parts)
     record::BlackBox::Run run;
     run.about.source = info.name;
     run.about.program = parts.program;
+    run.about.width = info.width;
+    run.about.height = info.height;
     run.about.format = info.format;
+    run.about.stereo = info.stereo;
     run.about.period_ns = info.period.count();
     run.about.rig = configuration.telemetry.rig_id;
     run.about.session = parts.session;

@@ -159,17 +159,19 @@ int run(const Arguments& arguments) {
   if (arguments.safe_lines) return make_lines_safe(rig.configuration());
   config::Configuration configuration = rig.configuration();
 
+  // Before the source is opened, which may take long.
   daemon::Daemon::Parts parts;
+  (void)telemetry::parse_endpoints(configuration.telemetry.destinations);
+  if (!configuration.telemetry.key_file.empty()) {
+    parts.signer =
+        std::make_unique<telemetry::Signer>(telemetry::load_key_file(configuration.telemetry.key_file).front());
+  }
   parts.configuration = &configuration;
   parts.source = open_source(rig);
   parts.calibration = rig.calibration ? &*rig.calibration : nullptr;
   parts.unit_m = rig.unit_m;
   parts.plan = daemon::make_plan(configuration, rig.unit_m);
   parts.program = std::string("stereotrackd ") + STEREOTRACK_VERSION;
-  if (!configuration.telemetry.key_file.empty()) {
-    parts.signer =
-        std::make_unique<telemetry::Signer>(telemetry::load_key_file(configuration.telemetry.key_file).front());
-  }
   const capture::SourceInfo info = parts.source->info();
   if (arguments.check) {
     const daemon::Daemon daemon(std::move(parts));

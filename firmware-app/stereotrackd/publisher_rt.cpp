@@ -198,7 +198,7 @@ void Publisher::publish(const Output& output) noexcept {
   message.capture_time = map_.to_capture(output.captured);
   message.send_time = map_.to_capture(output.due);
   message.latency = output.due - output.captured;
-  message.flags = wire_flags(leaving_.flags);
+  message.flags = wire_flags(leaving_.flags) | telemetry::kStateAtOutput;
   if (output.kind == OutputSchedule::Kind::kMissing) message.flags |= telemetry::kPairMissing;
   if (output.kind == OutputSchedule::Kind::kPredicted) message.flags |= telemetry::kPredicted;
   if (output.after_due) message.flags |= telemetry::kLate;

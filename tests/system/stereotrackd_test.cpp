@@ -1,0 +1,402 @@
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/record/recording_source.hpp"
+#include "drivers/telemetry/receiver.hpp"
+#include "drivers/telemetry/udp_listener.hpp"
+#include "tests/support/run_program.hpp"
+
+// The daemon as a process of its own. Nothing here depends on how fast the machine is: tests wait until something has
+// happened, and the limit of Program ends what never does.
+namespace stereotrack {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Program;
+using test::ProgramResult;
+using test::read_text;
+using test::run_program;
+using test::TempDir;
+
+const std::string kDaemon = STEREOTRACK_BIN_DIR "/stereotrackd";
+const std::string kTool = STEREOTRACK_BIN_DIR "/stereotrack";
+
+/// A small scene, and all files in a folder of their own.
+std::string small(const fs::path& folder, const std::string& more = "") {
+  const fs::path path = folder / "rig.toml";
+  std::ofstream(path) << "[source]\nname = \"synthetic:eleven\"\nfps = 30.0\n"
+                      << "[synthetic]\nframes = 24\nwidth = 160\nheight = 120\n"
+                      << "[realtime]\nmode = \"off\"\n"
+                      << "[service]\nstate_directory = \"" << (folder / "state").string() << "\"\n"
+                      << more;
+  return path.string();
+}
+
+bool wait_for(const std::function<bool()>& what) {
+  for (int i = 0; i < 6000; ++i) {
+    if (what()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+bool has_started(const Program& program) { return program.err_so_far().find("latency") != std::string::npos; }
+
+/// Datagrams as they come over UDP, by the sequence of their message.
+class Ear {
+ public:
+  Ear() : listener_(telemetry::parse_endpoint("127.0.0.1:0", true)) {}
+  [[nodiscard]] std::string where() const { return to_string(listener_.local()); }
+  void listen() {
+    std::array<std::byte, 2048> buffer{};
+    for (std::ptrdiff_t size = listener_.receive(buffer); size > 0; size = listener_.receive(buffer)) {
+      const auto bytes = std::span(buffer).first(static_cast<std::size_t>(size));
+      const auto datagram = telemetry::decode(bytes);
+      ASSERT_TRUE(datagram.has_value());
+      if (datagram->status) {
+        ++statuses_;
+      } else {
+        auto& parts = messages_[datagram->header.sequence];
+        parts.insert(parts.end(), bytes.begin(), bytes.end());
+        targets_ += datagram->targets.size();
+      }
+    }
+  }
+  [[nodiscard]] const std::map<std::uint64_t, std::vector<std::byte>>& messages() const { return messages_; }
+  [[nodiscard]] std::size_t statuses() const { return statuses_; }
+  [[nodiscard]] std::size_t targets() const { return targets_; }
+
+ private:
+  telemetry::UdpListener listener_;
+  std::map<std::uint64_t, std::vector<std::byte>> messages_;
+  std::size_t statuses_ = 0;
+  std::size_t targets_ = 0;
+};
+
+TEST(Stereotrackd, ChecksItsConfigurationAndStartsNothing) {
+  const TempDir folder;
+  const ProgramResult done = run_program({kDaemon, "--config", small(folder.path()), "--check-config"});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_NE(done.out.find("configuration, calibration and source are fine"), std::string::npos) << done.out;
+  EXPECT_NE(done.out.find("total"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "state"));
+}
+
+TEST(Stereotrackd, BadConfigurationIsOneLineAndExitCodeTwo) {
+  const TempDir folder;
+  struct Case {
+    std::string toml;
+    std::string says;
+  };
+  const std::string synthetic =
+      "[synthetic]\nframes = 2\nwidth = 64\nheight = 48\n[source]\nname = \"synthetic:eleven\"\n";
+  for (const Case& bad : {Case{"[source]\nfps = 30.0\n", "source.name: not set"},
+                          Case{"[source]\nname = \"synthetic:twelve\"\n", "twelve"},
+                          Case{"[source]\nname = \"/dev/video0\"\n", "source.name: \"/dev/video0\" is no source"},
+                          Case{synthetic + "[latency]\noutput = 50\n", "latency.output: unknown key"},
+                          Case{synthetic + "[telemetry]\ndestinations = [\"nowhere:1\"]\n", "nowhere"},
+                          Case{synthetic + "[telemetry]\nkey_file = "
+                                           "\"/no/such.key\"\n",
+                               "/no/such.key"}}) {
+    const fs::path path = folder / "bad.toml";
+    std::ofstream(path) << bad.toml;
+    const ProgramResult done = run_program({kDaemon, "--config", path.string()});
+    EXPECT_EQ(done.exit_code, 2) << bad.toml << done.err;
+    EXPECT_NE(done.err.find(bad.says), std::string::npos) << done.err;
+    EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
+  }
+  EXPECT_EQ(run_program({kDaemon}).exit_code, 2);
+  EXPECT_EQ(run_program({kDaemon, "--config", "/no/such.toml"}).exit_code, 2);
+}
+
+TEST(Stereotrackd, AChipThatIsNotThereIsNamed) {
+  const TempDir folder;
+  const ProgramResult done =
+      run_program({kDaemon, "--config",
+                   small(folder.path(), "[[signal]]\nname = \"a\"\nline = \"/dev/nochip:3\"\nwhen = \"confirmed\"\n")});
+  EXPECT_NE(done.exit_code, 0);
+  EXPECT_NE(done.err.find("/dev/nochip"), std::string::npos) << done.err;
+}
+
+TEST(Stereotrackd, SendsEachPairAndEndsWithTheFilm) {
+  const TempDir folder;
+  Ear ear;
+  Program daemon({kDaemon, "--config", small(folder.path()), "--set", "source.repeat=once", "--set",
+                  "telemetry.destinations=" + ear.where()});
+  const ProgramResult done = daemon.wait();
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  ear.listen();
+  EXPECT_GT(ear.messages().size(), 0U);
+  EXPECT_LE(ear.messages().size(), 24U);
+  EXPECT_EQ(read_text(folder / "state" / "session").substr(0, 1), "1");
+  EXPECT_FALSE(fs::exists(folder / "state" / "last_states.txt")) << "it is written on a fault alone";
+}
+
+TEST(Stereotrackd, SigtermEndsItCleanly) {
+  const TempDir folder;
+  Program daemon({kDaemon, "--config", small(folder.path())});
+  ASSERT_TRUE(wait_for([&] { return has_started(daemon); }));
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  const ProgramResult done = daemon.wait();
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+}
+
+TEST(Stereotrackd, EachRunHasAHigherSession) {
+  const TempDir folder;
+  const std::string config = small(folder.path());
+  for (const char* session : {"session 1", "session 2"}) {
+    const ProgramResult done = run_program({kDaemon, "--config", config, "--set", "source.repeat=once"});
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+    EXPECT_NE(done.err.find(session), std::string::npos) << done.err;
+  }
+}
+
+/// What systemd would hear.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const fs::path& path) : fd_(socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    EXPECT_EQ(bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+  ~NotifySocket() { (void)close(fd_); }
+  bool has_heard(const std::string& what) {
+    std::array<char, 4096> text{};
+    for (ssize_t size = recv(fd_, text.data(), text.size(), 0); size > 0;
+         size = recv(fd_, text.data(), text.size(), 0)) {
+      heard_.append(text.data(), static_cast<std::size_t>(size)).append("\n");
+    }
+    return heard_.find(what) != std::string::npos;
+  }
+
+ private:
+  int fd_;
+  std::string heard_;
+};
+
+TEST(Stereotrackd, TellsSystemdThatItIsReadyAliveReloadingAndStopping) {
+  const TempDir folder;
+  NotifySocket systemd(folder / "notify");
+  Program daemon({"/usr/bin/env", "NOTIFY_SOCKET=" + (folder / "notify").string(), "WATCHDOG_USEC=400000", kDaemon,
+                  "--config", small(folder.path())});
+  EXPECT_TRUE(wait_for([&] { return systemd.has_heard("READY=1"); }));
+  EXPECT_TRUE(wait_for([&] { return systemd.has_heard("WATCHDOG=1"); }));
+  EXPECT_TRUE(wait_for([&] { return systemd.has_heard("STATUS=synthetic:eleven"); }));
+  ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);
+  EXPECT_TRUE(wait_for([&] { return systemd.has_heard("RELOADING=1"); }));
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+  EXPECT_TRUE(systemd.has_heard("STOPPING=1"));
+}
+
+TEST(Stereotrackd, SighupTakesOverDestinationsAndRefusesTheRestByItsKey) {
+  const TempDir folder;
+  Ear first;
+  Ear second;
+  const auto to = [](const Ear& ear) { return "[telemetry]\ndestinations = [\"" + ear.where() + "\"]\n"; };
+  const std::string config = small(folder.path(), to(first));
+  Program daemon({kDaemon, "--config", config});
+  ASSERT_TRUE(wait_for([&] {
+    first.listen();
+    return first.messages().size() > 3;
+  })) << daemon.err_so_far();
+
+  (void)small(folder.path(), to(second) + "[latency]\noutput_ms = 70.0\n");
+  ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);
+  ASSERT_TRUE(wait_for([&] {
+    second.listen();
+    return second.messages().size() > 3;
+  })) << daemon.err_so_far();
+  EXPECT_TRUE(wait_for([&] {
+    return daemon.err_so_far().find("reload: latency.output_ms: cannot change") != std::string::npos;
+  })) << daemon.err_so_far();
+
+  // A wrong file never replaces the configuration that runs.
+  std::ofstream(config) << "[latency\n";
+  const std::size_t before = second.messages().size();
+  ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);
+  EXPECT_TRUE(wait_for([&] { return daemon.err_so_far().find("reload: refused") != std::string::npos; }));
+  EXPECT_TRUE(wait_for([&] {
+    second.listen();
+    return second.messages().size() > before + 3;
+  }));
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+}
+
+TEST(Stereotrackd, AFaultMakesTheLinesSafeAndTellsTheLastOutputs) {
+  const TempDir folder;
+  Ear ear;
+  Program daemon({kDaemon, "--config",
+                  small(folder.path(), "[[signal]]\nname = \"b\"\nline = \"sim:b\"\nwhen = \"heartbeat\"\n"), "--set",
+                  "telemetry.destinations=" + ear.where()});
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return ear.messages().size() > 3;
+  }));
+  ASSERT_EQ(kill(daemon.pid(), SIGSEGV), 0);
+  const ProgramResult done = daemon.wait();
+  EXPECT_EQ(done.signal, SIGSEGV);
+  EXPECT_NE(done.err.find("fault, signal 11: lines are in their safe states"), std::string::npos) << done.err;
+  const std::string told = read_text(folder / "state" / "last_states.txt");
+  EXPECT_NE(told.find("  pair "), std::string::npos) << told;
+  EXPECT_NE(told.find(" due_ns "), std::string::npos) << told;
+}
+
+TEST(Stereotrackd, DrivesItsLinesSafeAfterACrash) {
+  const TempDir folder;
+  const std::string lines =
+      "[[signal]]\nname = \"a\"\nline = \"sim:a\"\nwhen = \"confirmed\"\nsafe = \"active\"\n"
+      "[[signal]]\nname = \"b\"\nline = \"/dev/nochip:3\"\nwhen = \"confirmed\"\n";
+  const ProgramResult done = run_program({kDaemon, "--config", small(folder.path(), lines), "--safe-lines"});
+  EXPECT_EQ(done.exit_code, 1) << "one of them failed";
+  EXPECT_NE(done.err.find("sim:a"), std::string::npos) << done.err;
+  EXPECT_NE(done.err.find("/dev/nochip"), std::string::npos) << done.err;
+}
+
+std::string http_get(std::uint16_t port) {
+  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::string text;
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+    const std::string request = "GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+    EXPECT_EQ(send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+    std::array<char, 4096> part{};
+    for (ssize_t size = recv(fd, part.data(), part.size(), 0); size > 0; size = recv(fd, part.data(), part.size(), 0)) {
+      text.append(part.data(), static_cast<std::size_t>(size));
+    }
+  }
+  (void)close(fd);
+  return text;
+}
+
+TEST(Stereotrackd, ServesItsFiguresOverHttpAndInAFile) {
+  const TempDir folder;
+  const std::string file = (folder / "figures.prom").string();
+  Program daemon({kDaemon, "--config", small(folder.path()), "--set", "metrics.listen=127.0.0.1:0", "--set",
+                  "metrics.file=" + file});
+  std::uint16_t port = 0;
+  ASSERT_TRUE(wait_for([&] {
+    const std::string text = daemon.err_so_far();
+    const std::size_t at = text.find("http://127.0.0.1:");
+    if (at == std::string::npos) return false;
+    port = static_cast<std::uint16_t>(std::stoi(text.substr(at + 17)));
+    return true;
+  }));
+  std::string text;
+  EXPECT_TRUE(wait_for([&] {
+    text = http_get(port);
+    return text.find("stereotrack_outputs_total{cause=\"on_time\"} ") != std::string::npos &&
+           text.find("stereotrack_frames_total 0\n") == std::string::npos;
+  })) << text;
+  EXPECT_NE(text.find("HTTP/1.1 200"), std::string::npos);
+  EXPECT_NE(text.find("stereotrack_send_error_seconds{quantile=\"0.999\"}"), std::string::npos);
+  EXPECT_NE(text.find("stereotrack_stage_seconds_count{stage=\"disparity\"}"), std::string::npos);
+  EXPECT_NE(text.find("stereotrack_allocations_total{thread=\"frames\"} 0\n"), std::string::npos);
+  EXPECT_TRUE(wait_for([&] { return read_text(file).find("stereotrack_session 1\n") != std::string::npos; }));
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+}
+
+TEST(Stereotrackd, EnforceRefusesToStartWithoutTheRightsAndSaysHowToGrantThem) {
+  const TempDir folder;
+  std::vector<std::string> command;
+  if (geteuid() == 0) {
+    command = {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"};
+    fs::permissions(folder.path(), fs::perms::all);
+  }
+  for (const std::string& word :
+       {std::string("/usr/bin/prlimit"), std::string("--rtprio=0"), std::string("--memlock=65536"), kDaemon,
+        std::string("--config"), small(folder.path()), std::string("--set"), std::string("realtime.mode=enforce")}) {
+    command.push_back(word);
+  }
+  const ProgramResult done = run_program(command);
+  EXPECT_EQ(done.exit_code, 1) << done.err;
+  EXPECT_NE(done.err.find("realtime.mode = \"enforce\""), std::string::npos) << done.err;
+  EXPECT_NE(done.err.find("to grant it: "), std::string::npos) << done.err;
+}
+
+// The black box of a live run, on demand; its replay gives what the run had sent over UDP, byte for byte.
+TEST(Stereotrackd, ARecordingOfALiveRunReplaysItsTelemetryByteForByte) {
+  const TempDir folder;
+  Ear ear;
+  const fs::path recordings = folder / "recordings";
+  Program daemon({kDaemon, "--config", small(folder.path()), "--set", "synthetic.width=320", "--set",
+                  "synthetic.height=240", "--set", "synthetic.frames=60", "--set", "record.on=true", "--set",
+                  "record.seconds=2", "--set", "record.seconds_after=0.5", "--set",
+                  "record.directory=" + recordings.string(), "--set", "telemetry.destinations=" + ear.where()});
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return ear.messages().size() > 150;
+  })) << daemon.err_so_far();
+  ASSERT_EQ(kill(daemon.pid(), SIGUSR1), 0);
+  const auto written = [&]() -> std::string {
+    if (!fs::exists(recordings)) return {};
+    for (const auto& entry : fs::directory_iterator(recordings)) {
+      if (entry.path().extension() == ".strec" && entry.path().string().find("demand") != std::string::npos) {
+        return entry.path().string();
+      }
+    }
+    return {};
+  };
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return !written().empty();
+  })) << daemon.err_so_far();
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+  ear.listen();
+
+  const record::RecordingSource recording(written());
+  ASSERT_TRUE(recording.about().exact);
+  ASSERT_GT(recording.outputs().size(), 30U);
+  const ProgramResult replay = run_program({kTool, "replay", written(), "--out", (folder / "out").string()});
+  ASSERT_EQ(replay.exit_code, 0) << replay.err;
+  // telemetry.bin: each datagram after its length.
+  const std::string file = read_text(folder / "out" / "telemetry.bin");
+  std::map<std::uint64_t, std::vector<std::byte>> replayed;
+  std::size_t targets = 0;
+  for (std::size_t at = 0; at + 4 <= file.size();) {
+    std::uint32_t size = 0;
+    std::memcpy(&size, file.data() + at, 4);
+    const auto* bytes = reinterpret_cast<const std::byte*>(file.data() + at + 4);
+    const auto datagram = telemetry::decode({bytes, size});
+    ASSERT_TRUE(datagram.has_value());
+    auto& parts = replayed[datagram->header.sequence];
+    parts.insert(parts.end(), bytes, bytes + size);
+    targets += datagram->targets.size();
+    at += 4 + size;
+  }
+  EXPECT_GT(targets, 10U);
+  EXPECT_EQ(replayed.size(), recording.outputs().size());
+  for (const auto& [sequence, bytes] : replayed) {
+    const auto live = ear.messages().find(sequence);
+    ASSERT_NE(live, ear.messages().end()) << sequence;
+    EXPECT_TRUE(live->second == bytes) << "message " << sequence;
+  }
+}
+
+}  // namespace
+}  // namespace stereotrack
