@@ -139,6 +139,10 @@ bool BlackBox::is_free(std::uint64_t frame) noexcept {
 void BlackBox::break_row() noexcept {
   row_begin_ = next_;
   keyframe_due_ = next_;
+  // A keyframe from just before it leads to it. None of these is frozen: a frozen one has frames behind it.
+  for (Keyframe& keyframe : keyframes_) {
+    if (keyframe.before == next_) keyframe.bytes = 0;
+  }
 }
 
 void BlackBox::arm(FramePair& pair) noexcept {
@@ -436,9 +440,8 @@ void BlackBox::begin(const Frozen& frozen) {
   if (frozen.keyframe < 0) return;
   const Keyframe& keyframe = keyframes_[static_cast<std::size_t>(frozen.keyframe)];
   const std::span<std::byte> payload = keyframe.memory.first(keyframe.bytes);
-  if (!seal_state(payload.subspan(sizeof(KeyframeMeta))) || !writer_.write(RecordKind::kKeyframe, payload)) {
-    throw std::runtime_error(writer_.status());
-  }
+  if (!seal_state(payload.subspan(sizeof(KeyframeMeta)))) throw std::runtime_error("black box: a keyframe is torn");
+  if (!writer_.write(RecordKind::kKeyframe, payload)) throw std::runtime_error(writer_.status());
 }
 
 void BlackBox::write_some() {
