@@ -1,5 +1,7 @@
 #include "drivers/record/black_box.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -107,13 +109,17 @@ BlackBox::BlackBox(Config config, Run run, const Pipeline& pipeline)
   frames_after_ = frames_in(config_.seconds_after);
   slots_ = std::max<std::uint64_t>(frames_in(config_.seconds) + frames_after_, 1) + kSpareSlots;
   keyframe_every_ = std::max<std::uint64_t>(frames_in(config_.seconds) / 2, 1);
-  memory_ = arena_.array<std::byte>(static_cast<std::size_t>(slots_) * slot_bytes_);
+  // Asked for more than there is, Linux would give it and end the program once it is touched.
+  const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::uint64_t most = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) / 4 * 3 * page;
+  const bool fits = slots_ <= most / slot_bytes_;
+  if (fits) memory_ = arena_.array<std::byte>(static_cast<std::size_t>(slots_) * slot_bytes_);
   if (config_.reduce > 1) scratch_ = arena_.array<std::byte>(views * raw_bytes_);
   if (is_exact()) {
     const std::size_t block = sizeof(KeyframeMeta) + pipeline.state_bytes();
     for (Keyframe& keyframe : keyframes_) keyframe.memory = arena_.array<std::byte>(block);
   }
-  if (arena_.failed()) {
+  if (!fits || arena_.failed()) {
     throw std::runtime_error("black box: no memory for " + std::to_string(slots_) + " frames of " +
                              std::to_string(slot_bytes_) +
                              " bytes; lower record.seconds or record.seconds_after, or raise record.reduce");
