@@ -1,5 +1,7 @@
 #include "drivers/record/black_box.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -107,13 +109,17 @@ BlackBox::BlackBox(Config config, Run run, const Pipeline& pipeline)
   frames_after_ = frames_in(config_.seconds_after);
   slots_ = std::max<std::uint64_t>(frames_in(config_.seconds) + frames_after_, 1) + kSpareSlots;
   keyframe_every_ = std::max<std::uint64_t>(frames_in(config_.seconds) / 2, 1);
-  memory_ = arena_.array<std::byte>(static_cast<std::size_t>(slots_) * slot_bytes_);
+  // Asked for more than there is, Linux would give it and end the program once it is touched.
+  const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::uint64_t most = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) / 4 * 3 * page;
+  const bool fits = slots_ <= most / slot_bytes_;
+  if (fits) memory_ = arena_.array<std::byte>(static_cast<std::size_t>(slots_) * slot_bytes_);
   if (config_.reduce > 1) scratch_ = arena_.array<std::byte>(views * raw_bytes_);
   if (is_exact()) {
     const std::size_t block = sizeof(KeyframeMeta) + pipeline.state_bytes();
     for (Keyframe& keyframe : keyframes_) keyframe.memory = arena_.array<std::byte>(block);
   }
-  if (arena_.failed()) {
+  if (!fits || arena_.failed()) {
     throw std::runtime_error("black box: no memory for " + std::to_string(slots_) + " frames of " +
                              std::to_string(slot_bytes_) +
                              " bytes; lower record.seconds or record.seconds_after, or raise record.reduce");
@@ -139,6 +145,10 @@ bool BlackBox::is_free(std::uint64_t frame) noexcept {
 void BlackBox::break_row() noexcept {
   row_begin_ = next_;
   keyframe_due_ = next_;
+  // A keyframe from just before it leads to it. None of these is frozen: a frozen one has frames behind it.
+  for (Keyframe& keyframe : keyframes_) {
+    if (keyframe.before == next_) keyframe.bytes = 0;
+  }
 }
 
 void BlackBox::arm(FramePair& pair) noexcept {
@@ -439,9 +449,8 @@ void BlackBox::begin(const Frozen& frozen) {
   if (frozen.keyframe < 0) return;
   const Keyframe& keyframe = keyframes_[static_cast<std::size_t>(frozen.keyframe)];
   const std::span<std::byte> payload = keyframe.memory.first(keyframe.bytes);
-  if (!seal_state(payload.subspan(sizeof(KeyframeMeta))) || !writer_.write(RecordKind::kKeyframe, payload)) {
-    throw std::runtime_error(writer_.status());
-  }
+  if (!seal_state(payload.subspan(sizeof(KeyframeMeta)))) throw std::runtime_error("black box: a keyframe is torn");
+  if (!writer_.write(RecordKind::kKeyframe, payload)) throw std::runtime_error(writer_.status());
 }
 
 void BlackBox::write_some() {
