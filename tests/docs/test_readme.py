@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Documents that are wrong are worse than none: runs the README's commands, and looks up every option, key and verb.
 
-    test_readme.py PROJECT BIN      BIN: folder that holds the built stereotrack
+    test_readme.py PROJECT BIN      BIN: folder that holds the built programs
 """
 import os
 import pathlib
@@ -66,17 +66,25 @@ class Pages(unittest.TestCase):
                     with self.subTest(page=page.name, command=text):
                         self.assertIn(option, helps[sub])
 
+    def test_options_of_the_daemon_exist(self):
+        told = run(["stereotrackd", "--help"]).stdout
+        for page in PAGES:
+            for call in re.findall(r"^(?:    )?(stereotrackd [^#|\n]*)", page.read_text(), re.M):
+                for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", call):
+                    with self.subTest(page=page.name, command=call):
+                        self.assertIn(option, told)
+
     def test_keys_exist(self):
         sample, section, keys = (PROJECT / "config/stereotrack.sample.toml").read_text(), "", {"preset"}
         for line in sample.splitlines():
-            if match := re.match(r"\[(\w+)\]", line):
+            if match := re.match(r"\[([\w.]+)\]", line):
                 section = match.group(1) + "."
             elif match := re.match(r"(\w+) =", line):
                 keys.add(section + match.group(1))
         sections = {k.split(".")[0] for k in keys}
         for page in PAGES:
             text = page.read_text()
-            for key in re.findall(r"--set ([\w.]+)=", text) + re.findall(r"`([a-z_]+\.[a-z_0-9]+)`", text):
+            for key in re.findall(r"--set ([\w.]+)=", text) + re.findall(r"`([a-z_]+(?:\.[a-z_0-9]+)+)`", text):
                 if key.split(".")[0] in sections and not key.endswith((".csv", ".json", ".toml", ".yml", ".bin")):
                     with self.subTest(page=page.name, key=key):
                         self.assertIn(key, keys)
