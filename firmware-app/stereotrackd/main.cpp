@@ -18,6 +18,7 @@
 #include "firmware-app/stereotrackd/log.hpp"
 #include "firmware-app/stereotrackd/panic.hpp"
 #include "firmware-app/stereotrackd/plan.hpp"
+#include "firmware-app/stereotrackd/reload.hpp"
 #include "firmware-app/stereotrackd/service.hpp"
 
 namespace {
@@ -120,27 +121,6 @@ int make_lines_safe(const config::Configuration& configuration) {
   return all ? 0 : kFailed;
 }
 
-// SIGHUP. What is wrong changes nothing; what cannot change while it runs is named and stays.
-void reload(const Arguments& arguments, config::Configuration& running, double unit_m, daemon::Daemon& daemon) {
-  try {
-    const config::Loaded loaded = load_configuration(arguments.config, arguments.set);
-    const daemon::Difference difference = daemon::difference(running, loaded.configuration);
-    for (const std::string& key : difference.refused) {
-      log(LogLevel::kWarning, "reload: " + key + ": cannot change while the daemon runs, restart it",
-          {{"STEREOTRACK_CAUSE", "reload"}});
-    }
-    if (difference.plan) {
-      daemon.exchange(daemon::make_plan(loaded.configuration, unit_m));
-      daemon::take_plan_keys(loaded.configuration, running);
-    }
-    log(LogLevel::kInfo, std::string("reload: ") + (difference.plan ? "taken over" : "nothing to take over"),
-        {{"STEREOTRACK_CAUSE", "reload"}});
-  } catch (const std::exception& error) {
-    log(LogLevel::kError, std::string("reload: refused, the running configuration stays: ") + error.what(),
-        {{"STEREOTRACK_CAUSE", "reload"}});
-  }
-}
-
 // SIGUSR1.
 void record_now(const config::Configuration& configuration, daemon::Daemon& daemon) {
   record::BlackBox* box = daemon.black_box();
@@ -201,11 +181,12 @@ int run(const Arguments& arguments) {
   const std::uint64_t session = parts.session;
   daemon::Daemon daemon(std::move(parts));
   const daemon::Panic panic(daemon, (state / "last_states.txt").string());
-  daemon::Service service({.metrics = configuration.metrics,
-                           .session = session,
-                           .summary = summary_of(info, configuration, session),
-                           .reload = [&] { reload(arguments, configuration, rig.unit_m, daemon); },
-                           .record = [&] { record_now(configuration, daemon); }});
+  daemon::Service service(
+      {.metrics = configuration.metrics,
+       .session = session,
+       .summary = summary_of(info, configuration, session),
+       .reload = [&] { daemon::reload(arguments.config, arguments.set, rig.unit_m, configuration, daemon); },
+       .record = [&] { record_now(configuration, daemon); }});
   const std::vector<runtime::Missing> of_threads = daemon.start(configuration.realtime, !missing.empty());
   if (enforce && !of_threads.empty()) refuse(of_threads.front());
   missing.insert(missing.end(), of_threads.begin(), of_threads.end());
