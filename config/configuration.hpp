@@ -41,6 +41,7 @@ struct LatencyConfig {
   double output_ms = 50.0;  ///< [ms]
   double lead_ms = 0.8;     ///< [ms]
   double awake_ms = 0.05;   ///< [ms]
+  double late_ms = 1.0;     ///< [ms]
   double grace_ms = 2.0;    ///< [ms]
   double stale_ms = 500.0;  ///< over output_ms [ms]
   int missing_limit = 30;

@@ -71,6 +71,8 @@ std::vector<Key> keys_of(Configuration& c) {
       key("latency.awake_ms", c.latency.awake_ms, 0, 10, "ms",
           "The publisher is awake for the last part of its wait, so that what the kernel takes to wake it does not "
           "make the result late; costs that much of a core."),
+      key("latency.late_ms", c.latency.late_ms, 0.01, 1000, "ms",
+          "What leaves later than its moment by more has missed its deadline: counted, and a reason to record."),
       key("latency.grace_ms", c.latency.grace_ms, 0, 1000, "ms",
           "How long after that moment a result may still leave, flagged, when the publisher was kept from running."),
       key("latency.stale_ms", c.latency.stale_ms, 0, 60000, "ms",

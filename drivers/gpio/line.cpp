@@ -45,12 +45,20 @@ struct OutputLines::State {
   LineBits told = 0;  ///< active lines, as far as their chips took it
   std::array<Meter, kMaxLines> meters;
   std::atomic<int> last_error{0};
+  std::atomic<bool> held{false};  ///< safe for ever
+
+  bool hold() noexcept {
+    held.store(true);
+    bool all = true;
+    for (ChipLines& chip : chips) all = chip.request->set(levels(chip, safe)) == 0 && all;
+    return all;
+  }
 
   SetResult set(LineBits active, MonotonicTime now) noexcept {
     SetResult result;
     for (ChipLines& chip : chips) {
       const LineBits differ = (active ^ told) & chip.mine;
-      if (differ == 0 && !chip.failed) continue;
+      if ((differ == 0 && !chip.failed) || held.load()) continue;
       const int error = chip.request->set(levels(chip, active));
       chip.failed = error != 0;
       if (chip.failed) {
@@ -100,6 +108,8 @@ OutputLines::SetResult OutputLines::set(LineBits active, MonotonicTime now) noex
 }
 
 OutputLines::SetResult OutputLines::set_safe(MonotonicTime now) noexcept { return state_->set(state_->safe, now); }
+
+bool OutputLines::hold_safe() noexcept { return state_->hold(); }
 
 std::size_t OutputLines::size() const noexcept { return state_->names.size(); }
 

@@ -90,6 +90,9 @@ class OutputLines {
   SetResult set(LineBits active, MonotonicTime now) noexcept;
   /// All lines to their safe states.
   SetResult set_safe(MonotonicTime now) noexcept;
+  /// The same for ever, whatever set() asks for from now on, and whatever the lines are believed to show. For the
+  /// handler of a fault, while another thread may be amid set(). False: a chip refused.
+  [[nodiscard]] bool hold_safe() noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept;
   [[nodiscard]] const LineName& name(std::size_t line) const noexcept;

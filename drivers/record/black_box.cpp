@@ -21,7 +21,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kNotes = 32768;  // messages that the service thread keeps: ten minutes at 50 a second
-constexpr int kMostRounds = 20;        // of service_step() that wait for the last frames' messages
 // Slots beyond the seconds asked for: the frames that come before the service thread looks. And the oldest one may hold
 // pixels already of a frame whose run has failed.
 constexpr std::uint64_t kSpareSlots = 8;
@@ -350,7 +349,7 @@ bool BlackBox::service_step() noexcept {
 // Messages leave after their frames: whether those of the last ones are there, or have not come for long.
 bool BlackBox::is_told() noexcept {
   const bool told = noted_ == 0 || told_ordinal_ >= last_ordinal_written_;
-  return told || ++rounds_waited_ > kMostRounds;
+  return told || ++rounds_waited_ > config_.patience;
 }
 
 // The recording is given up; its frames go back.

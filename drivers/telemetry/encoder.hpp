@@ -63,6 +63,9 @@ class Encoder {
                                                          CaptureTime now,
                                                          std::span<std::byte, kMaxDatagramBytes> out) noexcept;
 
+  /// The next message has the number after this one: a replay of messages of which some are missing.
+  void go_on_after(std::uint64_t sequence) noexcept { sequence_ = sequence; }
+
   /// Number of the last message; 0 before the first.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return sequence_; }
   /// Number of the last status; 0 before the first.

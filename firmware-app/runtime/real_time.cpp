@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <ctime>
 #include <stdexcept>
 #include <utility>
 
@@ -94,6 +95,20 @@ void Thread::join() noexcept {
   if (joined_) return;
   joined_ = true;
   (void)pthread_join(thread_, nullptr);
+}
+
+bool Thread::join_for(std::chrono::milliseconds limit) noexcept {
+  if (joined_) return true;
+  timespec until{};
+  (void)clock_gettime(CLOCK_REALTIME, &until);  // the clock that pthread_timedjoin_np knows
+  until.tv_sec += limit.count() / 1000;
+  until.tv_nsec += limit.count() % 1000 * 1'000'000;
+  if (until.tv_nsec >= 1'000'000'000) {
+    ++until.tv_sec;
+    until.tv_nsec -= 1'000'000'000;
+  }
+  joined_ = pthread_timedjoin_np(thread_, nullptr, &until) == 0;
+  return joined_;
 }
 
 void* Thread::run(void* self) noexcept {

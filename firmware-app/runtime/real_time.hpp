@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <chrono>
 #include <functional>
 #include <semaphore>
 #include <string>
@@ -70,6 +71,8 @@ class Thread {
   ~Thread() { join(); }
 
   void join() noexcept;
+  /// The same for so long at most. False: it still runs; join() waits for it yet.
+  [[nodiscard]] bool join_for(std::chrono::milliseconds limit) noexcept;
 
   [[nodiscard]] const std::vector<Missing>& missing() const noexcept { return missing_; }
 

@@ -273,11 +273,12 @@ class Replay {
       std::vector<TrackReport> tracks;
       if (state != states_.end()) tracks = state->tracks;
       for (TrackReport& track : tracks) {
-        extrapolate(model, static_cast<double>(note.ahead_ns) * 1e-9, track);
+        extrapolate(model, to_seconds(std::chrono::nanoseconds(note.ahead_ns)), track);
         if (note.kind != static_cast<std::uint32_t>(runtime::OutputSchedule::Kind::kOnTime)) coast(track);
       }
       telemetry::Message message = record::message_of(note);
       message.tracks = tracks;
+      encoder_.go_on_after(note.sequence - 1);  // a message may not have been recorded
       send(message);
     }
   }

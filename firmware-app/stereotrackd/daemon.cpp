@@ -8,10 +8,14 @@
 #include "config/error.hpp"
 #include "config/schema.hpp"
 #include "firmware-app/runtime/clock.hpp"
+#include "firmware-app/stereotrackd/log.hpp"
 
 namespace stereotrack::daemon {
 
 namespace {
+
+constexpr std::chrono::milliseconds kRecorderPatience{500};
+constexpr std::chrono::milliseconds kRecorderRound{20};
 
 std::chrono::nanoseconds from_ms(double ms) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(ms * 1e6 + 0.5));
@@ -42,13 +46,14 @@ runtime::OutputSchedule::Config schedule_config(const config::LatencyConfig& lat
   return schedule;
 }
 
-record::BlackBox::Config box_config(const config::RecordConfig& record) {
+record::BlackBox::Config box_config(const config::RecordConfig& record, const config::LatencyConfig& latency) {
   return {.seconds = record.seconds,
           .seconds_after = record.seconds_after,
           .reduce = record.reduce,
           .every = record.every,
           .directory = record.directory,
-          .max_bytes = static_cast<std::uint64_t>(record.max_mb) << 20U};
+          .max_bytes = static_cast<std::uint64_t>(record.max_mb) << 20U,
+          .patience = 20 + static_cast<int>(from_ms(latency.output_ms) / kRecorderRound)};
 }
 
 /// What the publisher may trigger; the others are the main thread's.
@@ -89,6 +94,11 @@ Daemon::Daemon(Parts parts)
     throw config::Error("latency.output_ms: more than " + std::to_string(runtime::OutputSchedule::kMaxInFlight / 2) +
                         " pairs would be on their way at once: shorten it, or lower the rate of the source");
   }
+  if (publishing.schedule.lead > info.period / 2) {
+    throw config::Error("latency.lead_ms: over half of the source's period of " +
+                        std::to_string(info.period.count() / 1'000'000) +
+                        " ms, decisions would overtake each other: shorten it");
+  }
   publishing.encoder = {.rig = configuration.telemetry.rig_id, .session = parts.session, .signer = signer_.get()};
   publishing.extrapolation = {
       .acceleration = configuration.pipeline.track.acceleration, .width = info.width, .height = info.height};
@@ -98,6 +108,7 @@ Daemon::Daemon(Parts parts)
     publishing.focal_y_px = parts.calibration->left.fy;
   }
   publishing.heart_after = from_ms(configuration.latency.stale_ms);
+  publishing.late_after = from_ms(configuration.latency.late_ms);
   publishing.awake = from_ms(configuration.latency.awake_ms);
   publishing.pool_slots = parts.pool_slots;
   auto publisher = Publisher::create(publishing, std::move(parts.plan), lines_, pool_, notices_, *mailbox_, bell_,
@@ -140,7 +151,8 @@ Daemon::Daemon(Parts parts)
     run.about.unit_m = parts.unit_m;
     if (parts.calibration != nullptr) run.calibration = *parts.calibration;
     run.configuration = config::to_text(configuration);
-    box_ = std::make_unique<record::BlackBox>(box_config(configuration.record), std::move(run), *pipeline_);
+    box_ = std::make_unique<record::BlackBox>(box_config(configuration.record, configuration.latency), std::move(run),
+                                              *pipeline_);
     frames_->keep_in(box_.get());
     publisher_->keep_in(box_.get(), causes_of(configuration.record));
   }
@@ -159,13 +171,9 @@ std::vector<runtime::Missing> Daemon::start(const config::RealTimeConfig& real_t
   // Who takes before who gives.
   if (box_) {
     // A thread of its own: a disk that hangs must not keep the main thread from ending the daemon.
-    begin("st-recorder", real_time.service, [this] {
-      while (!stop_recorder_.load(std::memory_order_relaxed)) {
-        while (box_->service_step() && !stop_recorder_.load(std::memory_order_relaxed)) {
-        }
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      }
-    });
+    recorder_ =
+        std::make_unique<runtime::Thread>(plan_of("st-recorder", real_time.service), mode, [this] { record(); });
+    missing = recorder_->missing();
   }
   begin("st-publisher", real_time.publisher, [this] { publisher_->run(capture_end_.ended, stop_publisher_); });
   begin("st-frames", real_time.frames, [this] { frames_->run(*pipeline_, stop_capture_); });
@@ -175,9 +183,22 @@ std::vector<runtime::Missing> Daemon::start(const config::RealTimeConfig& real_t
   return missing;
 }
 
-bool Daemon::make_lines_safe() noexcept { return lines_.set_safe(runtime::monotonic_now()).failed == 0; }
+void Daemon::record() {
+  std::string told;
+  while (!stop_recorder_.load(std::memory_order_relaxed)) {
+    while (box_->service_step() && !stop_recorder_.load(std::memory_order_relaxed)) {
+    }
+    if (box_->last_error() != told) {
+      told = box_->last_error();
+      if (!told.empty()) log(LogLevel::kWarning, "recording: " + told, {{"STEREOTRACK_CAUSE", "record"}});
+    }
+    std::this_thread::sleep_for(kRecorderRound);
+  }
+}
 
-void Daemon::stop() noexcept {
+bool Daemon::make_lines_safe() noexcept { return lines_.hold_safe(); }
+
+bool Daemon::stop() noexcept {
   stop_capture_.store(true, std::memory_order_relaxed);
   pool_.close();
   stop_publisher_.store(true, std::memory_order_relaxed);
@@ -185,6 +206,7 @@ void Daemon::stop() noexcept {
   stop_recorder_.store(true, std::memory_order_relaxed);
   for (const auto& thread : threads_) thread->join();
   threads_.clear();
+  return !recorder_ || recorder_->join_for(kRecorderPatience);
 }
 
 bool Daemon::is_over() const noexcept {

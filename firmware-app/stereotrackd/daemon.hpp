@@ -54,8 +54,10 @@ class Daemon {
   /// here or before (`missing_before`), the health of all that leaves says so.
   [[nodiscard]] std::vector<runtime::Missing> start(const config::RealTimeConfig& real_time, bool missing_before);
 
-  /// Ends the threads; the lines are in their safe states then. Takes up to 0.1 s.
-  void stop() noexcept;
+  /// Ends the threads; the lines are in their safe states then. Takes up to 0.1 s, or latency.lead_ms. A recording that
+  /// is being written is given up. False: the recorder hangs in a write to its disk and still runs: the destructor
+  /// would wait for it.
+  bool stop() noexcept;
 
   /// The source has ended or failed, and all that it gave has left.
   [[nodiscard]] bool is_over() const noexcept;
@@ -81,6 +83,8 @@ class Daemon {
   [[nodiscard]] std::uint64_t lost_notices() const noexcept { return notices_.refused(); }
 
  private:
+  void record();
+
   std::unique_ptr<Vitals> vitals_;
   std::unique_ptr<capture::LiveSource> source_;
   gpio::OutputLines lines_;
@@ -101,6 +105,7 @@ class Daemon {
   std::atomic<bool> stop_publisher_{false};
   std::atomic<bool> stop_recorder_{false};
   std::vector<std::unique_ptr<runtime::Thread>> threads_;
+  std::unique_ptr<runtime::Thread> recorder_;
 };
 
 /// Effort names of shed.order, which config's rules have checked, as the controller wants them.

@@ -43,10 +43,6 @@ void FrameLoop::process(Pipeline& pipeline, capture::PairLease lease) noexcept {
     vitals_.frames_refused.add();
     return;
   }
-  if (box_ != nullptr) {
-    decisions_.shed = result->left_out;
-    box_->capture(pair, *result, decisions_);
-  }
   Outcome& outcome = mailbox_.draft();
   outcome.ordinal = result->ordinal;
   outcome.capture_time = result->capture_time;
@@ -58,13 +54,18 @@ void FrameLoop::process(Pipeline& pipeline, capture::PairLease lease) noexcept {
   }
   mailbox_.publish();
   bell_.ring();
+  // After the result has gone out: what the box takes delays the next pair, and counts against its budget.
+  if (box_ != nullptr) {
+    decisions_.shed = result->left_out;
+    box_->capture(pair, *result, decisions_);
+  }
 
   vitals_.frames.add();
   if (vitals_.frames.get() > kWarmUpFrames) vitals_.frame_allocations.add(heap_calls);
   vitals_.compute.record((done - began).count());
   vitals_.capture_to_result.record((done - captured).count());
   const std::chrono::nanoseconds left = captured + config_.latency - config_.lead - began;
-  leave_out_ = effort_.next(done - began, std::min(config_.period, left));
+  leave_out_ = effort_.next(runtime::monotonic_now() - began, std::min(config_.period, left));
   vitals_.efforts_left_out.set(leave_out_);
   const runtime::EffortController::Counters& counters = effort_.counters();
   std::uint64_t sheds = 0;
@@ -77,19 +78,30 @@ void FrameLoop::process(Pipeline& pipeline, capture::PairLease lease) noexcept {
 void FrameLoop::run(Pipeline& pipeline, const std::atomic<bool>& stop) noexcept {
   using Wait = capture::FramePool::Wait;
   const auto wait = std::min<std::chrono::nanoseconds>(2 * config_.period, kLongestWait);
+  last_frame_ = runtime::monotonic_now();
   while (!stop.load(std::memory_order_relaxed)) {
     vitals_.frame_beats.add();
     // A part of a keyframe as long as nothing else is to do.
     while (box_ != nullptr && pool_.wait(MonotonicTime()) == Wait::kDeadline && box_->keyframe_step(pipeline)) {
     }
     const Wait woke = pool_.wait(runtime::monotonic_now() + wait);
-    if (woke == Wait::kClosed) return;
+    if (woke == Wait::kClosed) break;
     if (woke == Wait::kDeadline) {
-      if (box_ != nullptr) box_->no_frame();
+      count_frames_that_did_not_come();
       continue;
     }
     if (capture::PairLease lease = pool_.take_newest()) process(pipeline, std::move(lease));
+    last_frame_ = runtime::monotonic_now();
   }
+  // What still waits will not be seen; it is counted as skipped.
+  while (pool_.take_newest()) vitals_.frames_left.add();
+}
+
+/// The seconds after a trigger go on without frames: one for each period that has passed.
+void FrameLoop::count_frames_that_did_not_come() noexcept {
+  if (box_ == nullptr) return;
+  const MonotonicTime now = runtime::monotonic_now();
+  for (; last_frame_ + 2 * config_.period <= now; last_frame_ += config_.period) box_->no_frame();
 }
 
 }  // namespace stereotrack::daemon

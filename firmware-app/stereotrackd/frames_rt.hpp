@@ -54,6 +54,7 @@ class FrameLoop {
  private:
   static void stage_ended(void* self, Stage stage) noexcept;
   void process(Pipeline& pipeline, capture::PairLease lease) noexcept;
+  void count_frames_that_did_not_come() noexcept;
 
   Config config_;
   runtime::EffortController effort_;
@@ -66,6 +67,7 @@ class FrameLoop {
   record::FrameDecisions decisions_;
   capture::PairLease lease_;
   MonotonicTime stage_began_{};
+  MonotonicTime last_frame_{};
   EffortBits leave_out_ = 0;
 };
 

@@ -14,8 +14,8 @@ enum class LogLevel : unsigned char { kError = 3, kWarning = 4, kNotice = 5, kIn
 using LogField = std::pair<std::string_view, std::string>;
 
 /// One line. To the journal with its fields where stderr is a journal stream, as under systemd (`journalctl
-/// STEREOTRACK_CAUSE=deadline`); else to stderr as text: "program: message". Never from a real-time thread. Any number
-/// of others.
+/// STEREOTRACK_CAUSE=predicted_late`); else to stderr as text: "program: message". Never from a real-time thread. Any
+/// number of others.
 void log(LogLevel level, const std::string& message, std::initializer_list<LogField> fields = {});
 
 }  // namespace stereotrack::daemon

@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
@@ -137,11 +138,30 @@ int run(const Arguments& arguments) {
   Rig rig;
   rig.loaded = load_configuration(arguments.config, arguments.set);
   if (arguments.safe_lines) return make_lines_safe(rig.configuration());
+  // Until there is somebody to read them, they must not end the program; SIGTERM may.
+  if (!arguments.check) {
+    for (const int signal : {SIGHUP, SIGUSR1}) (void)std::signal(signal, SIG_IGN);
+  }
   config::Configuration configuration = rig.configuration();
 
   // Before the source is opened, which may take long.
   daemon::Daemon::Parts parts;
   (void)telemetry::parse_endpoints(configuration.telemetry.destinations);
+  if (!configuration.metrics.listen.empty()) {
+    try {
+      (void)telemetry::parse_endpoint(configuration.metrics.listen, true);
+    } catch (const telemetry::EndpointError& error) {
+      throw config::error_at(rig.loaded.origins, "metrics.listen", error.what());
+    }
+  }
+  const config::SourceConfig& source = configuration.source;
+  for (const auto& [key, is_set] : {std::pair{"source.flip", source.flip},
+                                    {"source.swap", source.swap},
+                                    {"source.shift_rows", source.shift_rows != 0}}) {
+    if (!is_set) continue;
+    throw config::error_at(rig.loaded.origins, key,
+                           "only stereotrack replay does that: scenes and recordings of ours need none, leave it out");
+  }
   if (!configuration.telemetry.key_file.empty()) {
     parts.signer =
         std::make_unique<telemetry::Signer>(telemetry::load_key_file(configuration.telemetry.key_file).front());

@@ -84,6 +84,10 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
     const std::string label = std::string("{cause=\"") + kScheduleCounters[i].name + "\"}";
     text.value(label.c_str(), vitals.schedule[i].get());
   }
+  text.counter("sent_late_total", "Messages that left later than their moment by more than latency.late_ms.",
+               vitals.sent_late.get());
+  text.counter("deadline_misses_total", "Pairs that left late, not with their own result, or not at all.",
+               vitals.deadline_misses.get());
   text.gauge("targets", "Targets of the last message.", vitals.targets.get());
   text.gauge("health", "What is wrong now, sum of telemetry Health bits.", vitals.health.get());
   text.counter("clock_steps_total", "Times that capture times moved against the monotonic clock.",
@@ -131,6 +135,7 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
     text.value("{fate=\"merged\"}", counters.merged.load());
     text.counter("recorder_frames_dropped_total", "Frames not kept: their memory was still being written.",
                  counters.frames_dropped.load());
+    text.counter("recorder_messages_dropped_total", "Messages that recordings lack.", counters.outputs_dropped.load());
     text.family("keyframes_total", "counter", "Keyframes of the pipeline's state.");
     text.value("{fate=\"whole\"}", counters.keyframes.load());
     text.value("{fate=\"given_up\"}", counters.keyframes_given_up.load());

@@ -23,6 +23,7 @@ MetricsServer::MetricsServer(std::string_view listen) : server_(std::make_unique
   httplib::Server& http = server_->http;
   http.new_task_queue = [] { return new httplib::ThreadPool(1); };
   http.set_keep_alive_max_count(1);
+  http.set_keep_alive_timeout(1);  // an idle client holds the one worker, and the end of the daemon, no longer
   http.set_read_timeout(1, 0);
   http.set_write_timeout(1, 0);
   http.Get("/metrics", [this](const httplib::Request&, httplib::Response& response) {
@@ -37,6 +38,8 @@ MetricsServer::MetricsServer(std::string_view listen) : server_(std::make_unique
   }
   where_ = text.substr(0, text.rfind(':') + 1) + std::to_string(port);
   server_->thread = std::thread([&http] { (void)http.listen_after_bind(); });
+  // stop() of a server that does not listen yet does nothing, and join() would wait for ever.
+  while (!http.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
 MetricsServer::~MetricsServer() {

@@ -1,6 +1,7 @@
 #include "firmware-app/stereotrackd/panic.hpp"
 
 #include <fcntl.h>
+#include <pthread.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -24,6 +25,7 @@ constexpr std::array<int, 5> kFaults{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 Daemon* g_daemon = nullptr;
 int g_file = -1;
 std::atomic<bool> g_panics{false};
+std::atomic<pthread_t> g_panicking{};
 
 /// One line without printf, which may take memory and locks.
 class Line {
@@ -66,8 +68,9 @@ void tell(const Line& line) noexcept {
 }
 
 void on_fault(int signal) {
-  // A second fault, in here or in another thread: end at once.
+  // A second fault in here: end at once.
   if (!g_panics.exchange(true)) {
+    g_panicking.store(pthread_self());
     const bool safe = g_daemon->make_lines_safe();
     tell(Line()
              .text("stereotrackd: fault, signal ")
@@ -94,6 +97,10 @@ void on_fault(int signal) {
                .number(state.health));
     });
     if (g_file >= 0) (void)fsync(g_file);
+    (void)g_daemon->make_lines_safe();  // a set() that was under way in another thread is over now
+  } else if (g_panicking.load() != pthread_self()) {
+    // Another thread's fault: the first one is not through yet with the lines, and ends the process.
+    for (;;) (void)pause();
   }
   (void)std::signal(signal, SIG_DFL);
   (void)raise(signal);

@@ -12,12 +12,12 @@ namespace stereotrack::daemon {
 
 namespace {
 
-/// Keys that a Plan is made of: they can change while the daemon runs.
-constexpr std::array<std::string_view, 2> kOfThePlan{"telemetry.destinations", "telemetry.multicast_ttl"};
+/// Keys, beside zones and signals, that can change while the daemon runs.
+constexpr std::array<std::string_view, 2> kDestinations{"telemetry.destinations", "telemetry.multicast_ttl"};
 
 }  // namespace
 
-std::unique_ptr<Plan> make_plan(const config::Configuration& configuration, double unit_m) {
+std::unique_ptr<Plan> make_plan(const config::Configuration& configuration, double unit_m, bool with_rules) {
   const config::LatencyConfig& latency = configuration.latency;
   const std::chrono::nanoseconds stale_after(static_cast<std::int64_t>((latency.output_ms + latency.stale_ms) * 1e6));
   gpio::LineBits zones = 0;
@@ -25,17 +25,26 @@ std::unique_ptr<Plan> make_plan(const config::Configuration& configuration, doub
     if (configuration.signals[i].when == config::SignalWhen::kInZone) zones |= gpio::LineBits{1} << i;
   }
   const std::vector<telemetry::Endpoint> to = telemetry::parse_endpoints(configuration.telemetry.destinations);
-  return std::make_unique<Plan>(
-      Plan{std::make_unique<telemetry::UdpSender>(
-               to, telemetry::UdpSender::Config{.multicast_hops = configuration.telemetry.multicast_ttl}),
-           signals::make_rules(configuration, unit_m, stale_after), zones});
+  auto plan = std::make_unique<Plan>();
+  plan->sink = std::make_unique<telemetry::UdpSender>(
+      to, telemetry::UdpSender::Config{.multicast_hops = configuration.telemetry.multicast_ttl});
+  if (with_rules) plan->rules = signals::make_rules(configuration, unit_m, stale_after);
+  plan->zones = zones;
+  return plan;
 }
 
-void take_plan_keys(const config::Configuration& from, config::Configuration& to) {
-  to.telemetry.destinations = from.telemetry.destinations;
-  to.telemetry.multicast_ttl = from.telemetry.multicast_ttl;
-  to.zones = from.zones;
-  to.signals = from.signals;
+config::Configuration accepted(const config::Configuration& running, const config::Configuration& wanted,
+                               const Difference& difference) {
+  config::Configuration next = running;
+  if (difference.destinations) {
+    next.telemetry.destinations = wanted.telemetry.destinations;
+    next.telemetry.multicast_ttl = wanted.telemetry.multicast_ttl;
+  }
+  if (difference.rules) {
+    next.zones = wanted.zones;
+    next.signals = wanted.signals;
+  }
+  return next;
 }
 
 Difference difference(const config::Configuration& running, const config::Configuration& wanted) {
@@ -48,8 +57,8 @@ Difference difference(const config::Configuration& running, const config::Config
     const config::Key& key = before_keys[i];
     if (key.kind == config::Kind::kTables) continue;  // zones and signals, below
     if (key.get() == after_keys[i].get()) continue;
-    if (std::find(kOfThePlan.begin(), kOfThePlan.end(), key.name) != kOfThePlan.end()) {
-      difference.plan = true;
+    if (std::find(kDestinations.begin(), kDestinations.end(), key.name) != kDestinations.end()) {
+      difference.destinations = true;
     } else {
       difference.refused.push_back(key.name);
     }
@@ -57,7 +66,7 @@ Difference difference(const config::Configuration& running, const config::Config
   if (running.zones == wanted.zones && running.signals == wanted.signals) return difference;
   // A rule may change under a line; the lines themselves were requested at start.
   if (signals::line_specs(running) == signals::line_specs(wanted)) {
-    difference.plan = true;
+    difference.rules = true;
   } else {
     difference.refused.emplace_back("signal");
   }

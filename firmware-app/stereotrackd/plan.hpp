@@ -9,17 +9,21 @@
 
 namespace stereotrack::daemon {
 
-/// Where telemetry goes and what the lines tell, as the configuration says. Throws config::Error,
-/// telemetry::EndpointError or std::runtime_error, one line.
-[[nodiscard]] std::unique_ptr<Plan> make_plan(const config::Configuration& configuration, double unit_m);
+/// Where telemetry goes and what the lines tell, as the configuration says; without rules the publisher keeps those
+/// that it has. Throws config::Error, telemetry::EndpointError or std::runtime_error, one line.
+[[nodiscard]] std::unique_ptr<Plan> make_plan(const config::Configuration& configuration, double unit_m,
+                                              bool with_rules = true);
 
 /// What another configuration would change of one that runs.
 struct Difference {
-  bool plan = false;                 ///< something that a Plan holds
+  bool destinations = false;
+  bool rules = false;                ///< zones and signals; their lines are the same
   std::vector<std::string> refused;  ///< keys that need a restart
+  [[nodiscard]] bool plan() const noexcept { return destinations || rules; }
 };
-/// Copies what a Plan is made of.
-void take_plan_keys(const config::Configuration& from, config::Configuration& to);
+/// `running` with what of `wanted` can be taken over.
+[[nodiscard]] config::Configuration accepted(const config::Configuration& running, const config::Configuration& wanted,
+                                             const Difference& difference);
 [[nodiscard]] Difference difference(const config::Configuration& running, const config::Configuration& wanted);
 
 }  // namespace stereotrack::daemon

@@ -73,9 +73,10 @@ Publisher::~Publisher() {
 }
 
 void Publisher::exchange(std::unique_ptr<Plan> plan) {
-  // Acquire and release: the plan's content, in both directions.
-  delete retired_.exchange(nullptr, std::memory_order_acq_rel);
+  // Acquire and release: the plan's content, in both directions. The new one first: where the publisher takes the one
+  // before just now, the place for what is retired is emptied after it.
   delete incoming_.exchange(plan.release(), std::memory_order_acq_rel);
+  delete retired_.exchange(nullptr, std::memory_order_acq_rel);
   bell_.ring();
 }
 
@@ -89,19 +90,26 @@ void Publisher::take_plan() noexcept {
   before_.sent += done.sent;
   before_.dropped += done.dropped;
   before_.failed += done.failed;
+  if (next->rules) {
+    rules_are_new_ = true;
+  } else {
+    next->rules = plan_->rules;
+    next->zones = plan_->zones;
+  }
   retired_.store(plan_.release(), std::memory_order_release);
   plan_.reset(next);
   vitals_.reloads.add();
 }
 
-void Publisher::take_news(MonotonicTime now) noexcept {
+void Publisher::take_news() noexcept {
   capture::PairNotice notice;
   while (notices_.pop(notice)) {
-    schedule_.notice(notice.ordinal, notice.capture_time, now);
+    // Read after it came: a pair that was put in a moment ago must not look as if it were to come.
+    schedule_.notice(notice.ordinal, notice.capture_time, runtime::monotonic_now());
     skews_[notice.ordinal % skews_.size()] = notice;
   }
   if (const Outcome* outcome = mailbox_.take()) {
-    const auto keep = schedule_.result(outcome->ordinal, outcome->capture_time, now);
+    const auto keep = schedule_.result(outcome->ordinal, outcome->capture_time, runtime::monotonic_now());
     if (keep) kept_[*keep] = *outcome;
   }
 }
@@ -143,7 +151,7 @@ void Publisher::predict(const Output& output) noexcept {
   const Outcome& from = kept_[output.state->keep];
   leaving_.flags = from.flags;
   leaving_.left_out = from.left_out;
-  const double seconds = std::chrono::duration<double>(output.state->ahead).count();
+  const double seconds = to_seconds(output.state->ahead);
   for (const TrackReport& track : from.tracks) {
     TrackReport expected = track;
     extrapolate(config_.extrapolation, seconds, expected);
@@ -190,13 +198,18 @@ void Publisher::publish(const Output& output) noexcept {
                                             .depth_known = (leaving_.flags & kFlagMono) == 0,
                                             .deadline_missed = !own,
                                             .healthy = output.due - last_on_time_ <= config_.heart_after};
-  const gpio::LineBits lines = plan_->rules.decide(inputs, output.due);
+  const gpio::LineBits lines = plan_->rules->decide(inputs, output.due);
+  rules_are_new_ = false;
 
   telemetry::Message message;
   message.tracks = leaving_.tracks.view();
   message.ordinal = output.ordinal;
   message.capture_time = map_.to_capture(output.captured);
-  message.send_time = map_.to_capture(output.due);
+  if (output.ordinal != 0) {
+    const std::optional<capture::PairNotice>& notice = skews_[output.ordinal % skews_.size()];
+    if (notice && notice->ordinal == output.ordinal) message.capture_time = notice->capture_time;
+  }
+  message.send_time = message.capture_time + (output.due - output.captured);
   message.latency = output.due - output.captured;
   message.flags = wire_flags(leaving_.flags) | telemetry::kStateAtOutput;
   if (output.kind == OutputSchedule::Kind::kMissing) message.flags |= telemetry::kPairMissing;
@@ -204,8 +217,10 @@ void Publisher::publish(const Output& output) noexcept {
   if (output.after_due) message.flags |= telemetry::kLate;
   if (leaving_.left_out != 0) message.flags |= telemetry::kEffortShed;
   if (std::exchange(clock_stepped_, false)) message.flags |= telemetry::kClockStepped;
-  const auto& counters = schedule_.counters();
-  message.frames_skipped = narrow(counters.missing + counters.overslept_missing + pool_.counters().starved);
+  const std::uint64_t unused = unused_pairs();
+  if (unused != unused_told_) message.flags |= telemetry::kFramesSkippedBefore;
+  unused_told_ = unused;
+  message.frames_skipped = narrow(unused);
   message.unit_m = config_.unit_m;
   message.focal_x_px = config_.focal_x_px;
   message.focal_y_px = config_.focal_y_px;
@@ -223,7 +238,7 @@ void Publisher::publish(const Output& output) noexcept {
   vitals_.capture_to_send.record((sent - output.captured).count());
   vitals_.outputs.add();
   keep(output, message);
-  if (output.kind == OutputSchedule::Kind::kPredicted || output.after_due) trigger(record::kDeadlineMiss);
+  judge(output, sent - output.due);
   vitals_.targets.set(leaving_.tracks.size());
   last_states_.add({.ordinal = output.ordinal,
                     .due_ns = output.due.time_since_epoch().count(),
@@ -235,10 +250,30 @@ void Publisher::publish(const Output& output) noexcept {
                     .health = health_});
 }
 
+/// What left and was not as the contract wants it: once a message, whatever the reasons.
+void Publisher::judge(const Output& output, std::chrono::nanoseconds late) noexcept {
+  // That a pair did not come is not the daemon's deadline; that it left late is.
+  const bool sent_late = late > config_.late_after;
+  if (sent_late) vitals_.sent_late.add();
+  const bool missed = output.kind == OutputSchedule::Kind::kPredicted || sent_late || output.after_due;
+  if (missed) vitals_.deadline_misses_left.add();
+}
+
+std::uint64_t Publisher::deadline_misses() const noexcept {
+  return vitals_.deadline_misses_left.get() + schedule_.counters().overslept_pairs;
+}
+
+/// Pairs of which no result of their own could come: lost before, given up for want of a buffer, passed over, refused.
+std::uint64_t Publisher::unused_pairs() const noexcept {
+  const capture::FramePool::Counters pool = pool_.counters();
+  const OutputSchedule::Counters& outputs = schedule_.counters();
+  return outputs.missing + outputs.overslept_missing + pool.starved + pool.evicted + pool.skipped +
+         vitals_.frames_refused.get();
+}
+
 /// What went wrong since the last time, a second ago.
 void Publisher::judge_health() noexcept {
-  const OutputSchedule::Counters& counters = schedule_.counters();
-  const std::uint64_t misses = counters.predicted_late + counters.overslept_pairs + counters.after_due;
+  const std::uint64_t misses = deadline_misses();
   const std::uint64_t drops = vitals_.telemetry_dropped.get();
   const std::uint64_t lines_failed = vitals_.lines_failed.get();
   const std::uint64_t recordings =
@@ -309,8 +344,9 @@ void Publisher::send_status(MonotonicTime now) noexcept {
 }
 
 void Publisher::tell() noexcept {
-  const std::uint64_t overslept = schedule_.counters().overslept_pairs;
-  if (std::exchange(overslept_seen_, overslept) != overslept) trigger(record::kDeadlineMiss);
+  const std::uint64_t misses = deadline_misses();
+  vitals_.deadline_misses.set(misses);
+  if (std::exchange(misses_triggered_, misses) != misses) trigger(record::kDeadlineMiss);
   for (std::size_t i = 0; i < kScheduleCounters.size(); ++i) {
     vitals_.schedule[i].set(schedule_.counters().*kScheduleCounters[i].member);
   }
@@ -320,8 +356,20 @@ MonotonicTime Publisher::next_wake(MonotonicTime now) const noexcept {
   MonotonicTime wake = now + kLongestWait;
   if (next_status_ > now) wake = std::min(wake, next_status_);  // else it waits for the slot before it
   if (const auto slot = schedule_.next_wake()) wake = std::min(wake, *slot);
-  if (const auto change = plan_->rules.next_change()) wake = std::min(wake, *change);
+  if (const auto change = rules_are_new_ ? std::nullopt : plan_->rules->next_change()) wake = std::min(wake, *change);
   return wake;
+}
+
+/// A status where it delays no slot, or is overdue itself; what others read.
+void Publisher::between_slots(MonotonicTime now) noexcept {
+  tell();
+  if (now < next_status_) return;
+  const std::optional<MonotonicTime> slot = schedule_.next_wake();
+  const bool has_room = !slot || *slot - now > kStatusRoom;
+  if (!has_room && now < next_status_ + kStatusPeriod) return;
+  look_at_clocks(now);
+  send_status(now);
+  next_status_ = std::max(next_status_ + kStatusPeriod, now);
 }
 
 void Publisher::run(const std::atomic<bool>& no_more, const std::atomic<bool>& stop) noexcept {
@@ -335,29 +383,25 @@ void Publisher::run(const std::atomic<bool>& no_more, const std::atomic<bool>& s
     const bool is_last = no_more.load(std::memory_order_acquire);
     const capture::Doorbell::Count seen = bell_.rings();
     take_plan();
+    take_news();
     MonotonicTime now = runtime::monotonic_now();
-    take_news(now);
     if (is_last && schedule_.in_flight() == 0) break;
     if (schedule_.map_is_suspect()) look_at_clocks(now);
     const std::optional<MonotonicTime> slot = schedule_.next_wake();
     if (slot && *slot <= now) vitals_.publisher_wake_up.record((now - *slot).count());
     if (const std::optional<Output> output = schedule_.decide(now)) {
       publish(*output);
-    } else {
-      drive(plan_->rules.advance(now), now);
-      if (now >= next_status_ && (!slot || *slot - now > kStatusRoom)) {
-        look_at_clocks(now);
-        send_status(now);
-        next_status_ = std::max(next_status_ + kStatusPeriod, now);
-      }
-      tell();
-      const std::uint64_t heap_calls = allocations_of_this_thread() - heap_before;
-      if (vitals_.outputs.get() > kWarmUpOutputs) vitals_.publisher_allocations.add(heap_calls);
-      heap_before += heap_calls;
       now = runtime::monotonic_now();
-      const MonotonicTime wake = next_wake(now);
-      if (wake > now) (void)bell_.wait(seen, wake);
+    } else {
+      if (!rules_are_new_) drive(plan_->rules->advance(now), now);
     }
+    between_slots(now);
+    const std::uint64_t heap_calls = allocations_of_this_thread() - heap_before;
+    if (vitals_.outputs.get() > kWarmUpOutputs) vitals_.publisher_allocations.add(heap_calls);
+    heap_before += heap_calls;
+    now = runtime::monotonic_now();
+    const MonotonicTime wake = next_wake(now);
+    if (wake > now) (void)bell_.wait(seen, wake);
   }
   (void)lines_.set_safe(runtime::monotonic_now());
   tell();

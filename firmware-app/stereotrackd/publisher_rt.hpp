@@ -26,8 +26,8 @@ namespace stereotrack::daemon {
 /// What may be exchanged while the daemon runs.
 struct Plan {
   std::unique_ptr<telemetry::Sink> sink;
-  signals::SignalRules rules;
-  gpio::LineBits zones;  ///< lines that tell of a zone: their rise is a trigger of recordings
+  std::optional<signals::SignalRules> rules;  ///< none: those of the plan before go on; the first plan has some
+  gpio::LineBits zones = 0;  ///< lines that tell of a zone: their rise is a trigger of recordings; with rules alone
 };
 
 /// The publisher: every slot of the schedule leaves at its moment. It wakes a lead before, decides what leaves,
@@ -44,6 +44,7 @@ class Publisher {
     double focal_x_px = 0;
     double focal_y_px = 0;
     std::chrono::nanoseconds heart_after{0};  ///< healthy: a result of its own left no longer ago
+    std::chrono::nanoseconds late_after{0};   ///< what leaves later than due by more has missed its deadline
     std::chrono::nanoseconds awake{0};        ///< before a slot leaves, not asleep: runtime::sleep_until()
     std::size_t pool_slots = 0;
   };
@@ -86,10 +87,14 @@ class Publisher {
             gpio::OutputLines& lines, capture::FramePool& pool, capture::PairOutlet::Notices& notices,
             OutcomeMailbox& mailbox, capture::Doorbell& bell, const capture::LiveSource& source, Vitals& vitals);
 
-  void take_news(MonotonicTime now) noexcept;
+  void take_news() noexcept;
   void take_plan() noexcept;
   void look_at_clocks(MonotonicTime now) noexcept;
+  [[nodiscard]] std::uint64_t deadline_misses() const noexcept;
+  [[nodiscard]] std::uint64_t unused_pairs() const noexcept;
+  void between_slots(MonotonicTime now) noexcept;
   void publish(const Output& output) noexcept;
+  void judge(const Output& output, std::chrono::nanoseconds late) noexcept;
   void keep(const Output& output, const telemetry::Message& message) noexcept;
   void trigger(record::Cause cause) noexcept;
   void predict(const Output& output) noexcept;
@@ -115,10 +120,11 @@ class Publisher {
   record::BlackBox* box_ = nullptr;  ///< null: nothing is kept
   std::uint32_t causes_ = 0;
   gpio::LineBits lines_told_ = 0;
-  std::uint64_t overslept_seen_ = 0;
+  std::uint64_t misses_triggered_ = 0;
   std::atomic<Plan*> incoming_{nullptr};
   std::atomic<Plan*> retired_{nullptr};
   std::atomic<bool> finished_{false};
+  bool rules_are_new_ = false;  ///< they have decided nothing yet: the lines stay as they are until then
   std::atomic<std::uint32_t> standing_health_{0};
   LastStates last_states_;
 
@@ -137,6 +143,7 @@ class Publisher {
   std::uint32_t health_ = 0;
   std::uint64_t misses_seen_ = 0;  ///< at the last judgement
   std::uint64_t drops_seen_ = 0;
+  std::uint64_t unused_told_ = 0;
   std::uint64_t recordings_seen_ = 0;
   std::uint64_t lines_failed_seen_ = 0;
   telemetry::SinkCounters before_;  ///< of plans that were replaced

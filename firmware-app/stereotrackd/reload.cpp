@@ -1,6 +1,7 @@
 #include "firmware-app/stereotrackd/reload.hpp"
 
 #include <exception>
+#include <utility>
 
 #include "firmware-app/rig/rig.hpp"
 #include "firmware-app/stereotrackd/log.hpp"
@@ -17,13 +18,15 @@ Reload reload(const std::string& file, const std::vector<std::string>& set, doub
       log(LogLevel::kWarning, "reload: " + key + ": cannot change while the daemon runs, restart it",
           {{"STEREOTRACK_CAUSE", "reload"}});
     }
-    if (change.plan) {
-      daemon.exchange(make_plan(loaded.configuration, unit_m));
-      take_plan_keys(loaded.configuration, running);
+    if (change.plan()) {
+      // What is refused must not come in with what is not: rules of other signals would drive the lines of these.
+      config::Configuration next = accepted(running, loaded.configuration, change);
+      daemon.exchange(make_plan(next, unit_m, change.rules));
+      running = std::move(next);
     }
-    log(LogLevel::kInfo, std::string("reload: ") + (change.plan ? "taken over" : "nothing to take over"),
+    log(LogLevel::kInfo, std::string("reload: ") + (change.plan() ? "taken over" : "nothing to take over"),
         {{"STEREOTRACK_CAUSE", "reload"}});
-    return change.plan ? Reload::kTakenOver : Reload::kNothing;
+    return change.plan() ? Reload::kTakenOver : Reload::kNothing;
   } catch (const std::exception& error) {
     log(LogLevel::kError, std::string("reload: refused, the running configuration stays: ") + error.what(),
         {{"STEREOTRACK_CAUSE", "reload"}});

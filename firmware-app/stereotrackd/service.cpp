@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 
@@ -18,6 +19,13 @@ namespace stereotrack::daemon {
 namespace {
 
 constexpr std::chrono::milliseconds kRound{100};
+
+sigset_t signals_of_the_service() {
+  sigset_t wanted;
+  sigemptyset(&wanted);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1}) sigaddset(&wanted, signal);
+  return wanted;
+}
 
 std::string efforts_text(std::uint64_t bits) {
   std::string text;
@@ -32,9 +40,7 @@ std::string efforts_text(std::uint64_t bits) {
 }  // namespace
 
 Service::Service(const Config& config) : config_(config) {
-  sigset_t wanted;
-  sigemptyset(&wanted);
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGUSR1}) sigaddset(&wanted, signal);
+  const sigset_t wanted = signals_of_the_service();
   // A telemetry or metrics peer that goes away must not end the daemon.
   (void)std::signal(SIGPIPE, SIG_IGN);
   if (pthread_sigmask(SIG_BLOCK, &wanted, nullptr) != 0) throw std::runtime_error("signals cannot be blocked");
@@ -50,17 +56,23 @@ Service::~Service() {
 }
 
 bool Service::take_signals() {
+  // All of them first: SIGTERM counts, however many SIGHUPs came before it, and of these one is enough.
   signalfd_siginfo info{};
+  bool wants_reload = false;
+  bool wants_record = false;
+  int ends = 0;
   while (read(signals_, &info, sizeof info) == sizeof info) {
-    if (info.ssi_signo == SIGUSR1) {
-      if (config_.record) config_.record();
-      continue;
-    }
-    if (info.ssi_signo != SIGHUP) {
-      log(LogLevel::kInfo, std::string(strsignal(static_cast<int>(info.ssi_signo))) + ": ending");
-      return false;
-    }
-    if (!config_.reload) continue;
+    const int signal = static_cast<int>(info.ssi_signo);
+    wants_reload = wants_reload || signal == SIGHUP;
+    wants_record = wants_record || signal == SIGUSR1;
+    if (signal == SIGTERM || signal == SIGINT) ends = signal;
+  }
+  if (ends != 0) {
+    log(LogLevel::kInfo, std::string(strsignal(ends)) + ": ending");
+    return false;
+  }
+  if (wants_record && config_.record) config_.record();
+  if (wants_reload && config_.reload) {
     (void)sd_notify(0, "RELOADING=1");
     config_.reload();
     (void)sd_notify(0, "READY=1");
@@ -121,7 +133,7 @@ void Service::log_changes(const Daemon& daemon) {
     const std::uint64_t lost =
         changed(recordings_lost_, counters.recordings_failed.load() + counters.triggers_dropped.load());
     if (lost > 0) {
-      log(LogLevel::kWarning, std::to_string(lost) + " recordings were dropped: the disk is full, slow or not writable",
+      log(LogLevel::kWarning, std::to_string(lost) + " recordings were dropped, one was being written, or failed",
           {{"STEREOTRACK_CAUSE", "record"}});
     }
   }
@@ -171,8 +183,14 @@ void Service::run(Daemon& daemon) {
     (void)poll(&ready, 1, static_cast<int>(kRound.count()));
   }
   (void)sd_notify(0, "STOPPING=1");
-  daemon.stop();
+  const bool stopped = daemon.stop();
   every_second(daemon);
+  if (!stopped) {
+    // Nothing can end a write that hangs but the end of the process; all that matters has ended already.
+    log(LogLevel::kWarning, "a recording hangs in its write and is lost: is the disk alive?",
+        {{"STEREOTRACK_CAUSE", "record"}});
+    std::_Exit(daemon.failure().empty() ? 0 : 1);
+  }
   if (const std::string failure = daemon.failure(); !failure.empty()) throw std::runtime_error(failure);
 }
 

@@ -56,7 +56,6 @@ class Service {
   std::array<std::uint64_t, 3> beats_{};
   std::array<std::uint64_t, kScheduleCounters.size()> schedule_{};
   std::uint64_t efforts_ = 0;
-  std::uint64_t health_ = 0;
   std::uint64_t allocations_ = 0;
   std::uint64_t lines_failed_ = 0;
   std::uint64_t telemetry_failed_ = 0;

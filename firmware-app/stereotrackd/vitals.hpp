@@ -46,6 +46,7 @@ struct Vitals {
   // ---- Frame loop
   Counter frame_beats;
   Counter frames;                        ///< pairs that went through the pipeline
+  Counter frames_left;                   ///< pairs that waited when the loop ended
   Counter frames_refused;                ///< pairs that the pipeline had a fault with
   Counter frame_allocations;             ///< heap calls after warm-up
   Counter efforts_left_out;              ///< now: EffortBits
@@ -61,6 +62,9 @@ struct Vitals {
   Counter publisher_beats;
   std::array<Counter, kScheduleCounters.size()> schedule;
   Counter outputs;                ///< messages that left
+  Counter sent_late;              ///< of these, more than latency.late_ms after their moment
+  Counter deadline_misses_left;   ///< of these, not with a result of their own, or late
+  Counter deadline_misses;        ///< the same, and pairs whose slots were slept over
   Counter publisher_allocations;  ///< heap calls after warm-up
   Counter telemetry_sent;         ///< datagrams, times destinations
   Counter telemetry_dropped;

@@ -48,9 +48,13 @@ class ClockMap {
   std::chrono::nanoseconds offset_{0};
 };
 
-/// a - b in seconds, exact to a nanosecond for spans under 100 days.
-[[nodiscard]] inline double seconds_between(CaptureTime b, CaptureTime a) noexcept {
-  return static_cast<double>((a - b).count()) * 1e-9;
+/// In seconds, exact to a nanosecond for spans under 100 days. Always by this product: a division by 1e9 gives other
+/// bits.
+[[nodiscard]] inline double to_seconds(std::chrono::nanoseconds span) noexcept {
+  return static_cast<double>(span.count()) * 1e-9;
 }
+
+/// a - b in seconds, exact to a nanosecond for spans under 100 days.
+[[nodiscard]] inline double seconds_between(CaptureTime b, CaptureTime a) noexcept { return to_seconds(a - b); }
 
 }  // namespace stereotrack

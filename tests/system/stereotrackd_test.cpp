@@ -110,6 +110,9 @@ TEST(Stereotrackd, BadConfigurationIsOneLineAndExitCodeTwo) {
                           Case{"[source]\nname = \"synthetic:twelve\"\n", "twelve"},
                           Case{"[source]\nname = \"/dev/video0\"\n", "source.name: \"/dev/video0\" is no source"},
                           Case{synthetic + "[latency]\noutput = 50\n", "latency.output: unknown key"},
+                          Case{synthetic + "[metrics]\nlisten = \"garbage\"\n", "metrics.listen: "},
+                          Case{synthetic + "[latency]\nlead_ms = 20\n", "latency.lead_ms: "},
+                          Case{"[source]\nflip = true\nname = \"synthetic:eleven\"\n", "source.flip: "},
                           Case{synthetic + "[telemetry]\ndestinations = [\"nowhere:1\"]\n", "nowhere"},
                           Case{synthetic + "[telemetry]\nkey_file = "
                                            "\"/no/such.key\"\n",
@@ -143,7 +146,6 @@ TEST(Stereotrackd, SendsEachPairAndEndsWithTheFilm) {
   EXPECT_EQ(done.exit_code, 0) << done.err;
   ear.listen();
   EXPECT_GT(ear.messages().size(), 0U);
-  EXPECT_LE(ear.messages().size(), 24U);
   EXPECT_EQ(read_text(folder / "state" / "session").substr(0, 1), "1");
   EXPECT_FALSE(fs::exists(folder / "state" / "last_states.txt")) << "it is written on a fault alone";
 }
@@ -239,6 +241,42 @@ TEST(Stereotrackd, SighupTakesOverDestinationsAndRefusesTheRestByItsKey) {
     second.listen();
     return second.messages().size() > before + 3;
   }));
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+}
+
+// Signals in another order are other lines, which cannot change; what can is taken over without them.
+TEST(Stereotrackd, SighupNeverPutsARuleOnAnotherLine) {
+  const TempDir folder;
+  Ear first;
+  Ear second;
+  const std::string beat = "[[signal]]\nname = \"beat\"\nline = \"sim:beat\"\nwhen = \"heartbeat\"\n";
+  const std::string zone =
+      "[[zone]]\nname = \"nowhere\"\nz_m = [9000, 9001]\n"
+      "[[signal]]\nname = \"zone\"\nline = \"sim:zone\"\nwhen = \"in_zone\"\nzone = \"nowhere\"\n";
+  const std::string figures = (folder / "figures.prom").string();
+  const auto with = [&](const Ear& ear, const std::string& signals) {
+    return small(folder.path(), "[metrics]\nfile = \"" + figures + "\"\n[telemetry]\ndestinations = [\"" + ear.where() +
+                                    "\"]\n" + signals);
+  };
+  const auto edges = [&](const std::string& line) {
+    const std::string text = read_text(figures);
+    const std::string name = "stereotrack_line_transitions_total{line=\"" + line + "\"} ";
+    const std::size_t at = text.find(name);
+    return at == std::string::npos ? 0 : std::stoi(text.substr(at + name.size()));
+  };
+  Program daemon({kDaemon, "--config", with(first, beat + zone)});
+  ASSERT_TRUE(wait_for([&] { return edges("sim:beat") > 1; })) << daemon.err_so_far();
+  (void)with(second, zone + beat);
+  ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);
+  ASSERT_TRUE(wait_for([&] {
+    second.listen();
+    return second.messages().size() > 3;
+  })) << daemon.err_so_far();
+  EXPECT_NE(daemon.err_so_far().find("reload: signal: cannot change"), std::string::npos) << daemon.err_so_far();
+  const int before = edges("sim:beat");
+  EXPECT_TRUE(wait_for([&] { return edges("sim:beat") > before + 2; }));
+  EXPECT_EQ(edges("sim:zone"), 0);
   ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
   EXPECT_EQ(daemon.wait().exit_code, 0);
 }
@@ -343,10 +381,27 @@ TEST(Stereotrackd, ARecordingOfALiveRunReplaysItsTelemetryByteForByte) {
   const TempDir folder;
   Ear ear;
   const fs::path recordings = folder / "recordings";
-  Program daemon({kDaemon, "--config", small(folder.path()), "--set", "synthetic.width=320", "--set",
-                  "synthetic.height=240", "--set", "synthetic.frames=60", "--set", "record.on=true", "--set",
-                  "record.seconds=2", "--set", "record.seconds_after=0.5", "--set",
-                  "record.directory=" + recordings.string(), "--set", "telemetry.destinations=" + ear.where()});
+  Program daemon({kDaemon,
+                  "--config",
+                  small(folder.path()),
+                  "--set",
+                  "synthetic.width=320",
+                  "--set",
+                  "synthetic.height=240",
+                  "--set",
+                  "synthetic.frames=60",
+                  "--set",
+                  "record.on=true",
+                  "--set",
+                  "record.seconds=2",
+                  "--set",
+                  "record.seconds_after=0.5",
+                  "--set",
+                  "record.on_deadline=false",
+                  "--set",
+                  "record.directory=" + recordings.string(),
+                  "--set",
+                  "telemetry.destinations=" + ear.where()});
   ASSERT_TRUE(wait_for([&] {
     ear.listen();
     return ear.messages().size() > 150;

@@ -87,7 +87,7 @@ void run_naive(const config::Configuration& configuration, const StereoCalibrati
     while (results.pop(result)) {
       const Extrapolation model{configuration.pipeline.track.acceleration, info.width, info.height};
       for (TrackReport& track : result.tracks) {
-        extrapolate(model, std::chrono::duration<double>(latency).count(), track);
+        extrapolate(model, to_seconds(latency), track);
       }
       telemetry::Message message;
       message.tracks = result.tracks;

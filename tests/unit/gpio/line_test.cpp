@@ -85,6 +85,28 @@ TEST(OutputLines, SetSafeIsTheSafeState) {
   EXPECT_EQ(level("stop_b"), true);
 }
 
+TEST(OutputLines, HeldSafeTheyStaySoWhateverIsAskedFor) {
+  const std::vector<LineSpec> specs{sim("held_a"), sim("held_b", false, true)};
+  OutputLines lines = open_lines(specs, "test");
+  static_cast<void>(lines.set(0b01, at(1)));
+  EXPECT_EQ(level("held_a"), true);
+  EXPECT_EQ(level("held_b"), false);
+  EXPECT_TRUE(lines.hold_safe());
+  EXPECT_EQ(level("held_a"), false);
+  EXPECT_EQ(level("held_b"), true);
+  static_cast<void>(lines.set(0b01, at(2)));
+  EXPECT_EQ(level("held_a"), false);
+  EXPECT_EQ(level("held_b"), true);
+}
+
+TEST(OutputLines, HeldSafeSaysWhereAChipRefuses) {
+  const std::vector<LineSpec> specs{sim("held_gone")};
+  OutputLines lines = open_lines(specs, "test");
+  simulated_chip::set_gone("held_gone", true);
+  EXPECT_FALSE(lines.hold_safe());
+  simulated_chip::set_gone("held_gone", false);
+}
+
 TEST(OutputLines, BitsBeyondTheLinesMeanNothing) {
   OutputLines lines = open_lines(std::vector{sim("beyond")}, "test");
   EXPECT_EQ(lines.set(~LineBits{0}, at(1)).changed, 1U);
