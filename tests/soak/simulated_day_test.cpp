@@ -640,6 +640,23 @@ const std::vector<Fault>& all_faults() {
         {kOverruns, 1},
         {kSheds, 1},
         {kRestores, 1}}},
+      // A burst at 41 ms: in time for the first to leave, but that is told as missing already, at 39 ms.
+      {"the capture thread is held up by a little less",
+       [](Day& day, std::uint64_t) {
+         for (std::uint64_t i = 0; i < 3; ++i) {
+           const nanoseconds burst = milliseconds(39) + static_cast<int>(i) * microseconds(200);
+           day.plan(i).late.fill(burst - static_cast<int>(i) * kPeriod);
+         }
+       },
+       {{kMissing, 1},
+        {kLateNotices, 1},
+        {kPredictedLate, 1},
+        {kLateResults, 1},
+        {kSkipped, 1},
+        {kOnTime, -2},
+        {kOverruns, 1},
+        {kSheds, 1},
+        {kRestores, 1}}},
       {"the chip is gone", [](Day&, std::uint64_t) { Day::chip_is_gone(true); }, {}},
   };
   return kAll;
