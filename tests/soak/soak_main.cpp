@@ -268,11 +268,7 @@ class Soak {
                              .session = 1,
                              .summary = "soak",
                              .reload = [this] { reload(); },
-                             .record =
-                                 [this] {
-                                   box().trigger(record::kDemand);
-                                   ++triggers_;
-                                 }});
+                             .record = [this] { box().trigger(record::kDemand); }});
     (void)daemon_->start(configuration_.realtime, false);
     std::thread tormentor([this] { torment(); });
     try {
@@ -300,7 +296,8 @@ class Soak {
   }
 
   void wrong(const std::string& what) {
-    (void)std::fprintf(stderr, "stereotrack_soak: %s\n", what.c_str());
+    (void)std::printf("WRONG: %s\n", what.c_str());
+    (void)std::fflush(stdout);
     failures_.push_back(what);
   }
 
@@ -446,6 +443,10 @@ class Soak {
     for (Fault& fault : faults_) fault.next = start + milliseconds(random_.upto(3000, 12'000));
     Clock::time_point second = start;
     for (;;) {
+      if (main_is_back_.load()) {
+        wrong("ended before its time");
+        return;
+      }
       const Clock::time_point now = Clock::now();
       bool waits = false;
       for (Fault& fault : faults_) {
@@ -468,6 +469,8 @@ class Soak {
     if (main_is_back_.load()) return;
     wrong("the daemon does not end: a thread does not come back");
     print_table();
+    (void)std::printf("soak: FAILED\n");
+    (void)std::fflush(stdout);
     std::_Exit(1);
   }
 
@@ -631,7 +634,6 @@ class Soak {
   // Of the main thread and the tormentor.
   std::atomic<unsigned> bad_sockets_{0};  ///< BadSocket
   std::array<std::atomic<std::uint64_t>, 3> reloads_{};
-  std::atomic<std::uint64_t> triggers_{0};
   std::atomic<bool> main_is_back_{false};
 
   // The tormentor's; the main thread's before it begins and after it has ended.
@@ -662,6 +664,7 @@ int run(const Arguments& arguments) {
   if (!arguments.log.empty() && std::freopen(arguments.log.c_str(), "w", stderr) == nullptr) {
     throw std::runtime_error(arguments.log + ": cannot be written");
   }
+  (void)std::setvbuf(stderr, nullptr, _IONBF, 0);  // a file, too: what was logged last matters most
   Soak soak(arguments, keeper);
   return soak.run();
 }
