@@ -148,7 +148,7 @@ std::optional<std::size_t> OutputSchedule::result(std::uint64_t ordinal, Capture
     ++counters_.stale_results;
     return std::nullopt;
   }
-  if (ordinal <= decided_) ++counters_.late_results;
+  if (!pending && ordinal <= decided_) ++counters_.late_results;
   if (pending) captured = captured_of(ordinal);  // the map may have changed since the notice
   const std::size_t keep = room_for_result();
   kept_[keep] = {ordinal, capture_time, captured};
@@ -182,7 +182,7 @@ void OutputSchedule::consume(const Slot& slot) noexcept {
     if (++missing_run_ == config_.missing_limit) ++counters_.outages;
     return;
   }
-  decided_ = slot.ordinal;
+  decided_ = std::max(decided_, slot.ordinal);  // a later one may have ended before it: a late notice
   std::copy(pending_.begin() + 1, pending_.begin() + static_cast<std::ptrdiff_t>(pending_count_), pending_.begin());
   --pending_count_;
 }

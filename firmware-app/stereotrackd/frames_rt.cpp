@@ -34,9 +34,7 @@ void FrameLoop::process(Pipeline& pipeline, capture::PairLease lease) noexcept {
   const MonotonicTime captured = source_.clock_map().to_monotonic(pair.capture_time);
   vitals_.frame_wake_up.record((began - captured).count());
   stage_began_ = began;
-  const std::uint64_t heap_before = allocations_of_this_thread();
   const Result<FrameResult> result = pipeline.run(pair, leave_out_);
-  const std::uint64_t heap_calls = allocations_of_this_thread() - heap_before;
   lease_.release();
   const MonotonicTime done = runtime::monotonic_now();
   if (!result.has_value()) {
@@ -61,7 +59,6 @@ void FrameLoop::process(Pipeline& pipeline, capture::PairLease lease) noexcept {
   }
 
   vitals_.frames.add();
-  if (vitals_.frames.get() > kWarmUpFrames) vitals_.frame_allocations.add(heap_calls);
   vitals_.compute.record((done - began).count());
   vitals_.capture_to_result.record((done - captured).count());
   const std::chrono::nanoseconds left = captured + config_.latency - config_.lead - began;
@@ -79,8 +76,13 @@ void FrameLoop::run(Pipeline& pipeline, const std::atomic<bool>& stop) noexcept 
   using Wait = capture::FramePool::Wait;
   const auto wait = std::min<std::chrono::nanoseconds>(2 * config_.period, kLongestWait);
   last_frame_ = runtime::monotonic_now();
+  std::uint64_t heap_before = allocations_of_this_thread();
   while (!stop.load(std::memory_order_relaxed)) {
     vitals_.frame_beats.add();
+    // Of the whole round before: what surrounds the pipeline keeps the rule, too.
+    const std::uint64_t heap_calls = allocations_of_this_thread() - heap_before;
+    heap_before += heap_calls;
+    if (vitals_.frames.get() > kWarmUpFrames) vitals_.frame_allocations.add(heap_calls);
     // A part of a keyframe as long as nothing else is to do.
     while (box_ != nullptr && pool_.wait(MonotonicTime()) == Wait::kDeadline && box_->keyframe_step(pipeline)) {
     }

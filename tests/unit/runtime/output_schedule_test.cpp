@@ -295,6 +295,20 @@ TEST(OutputSchedule, ALateNoticeIsNotToldTwice) {
   EXPECT_EQ(rig.schedule.counters().late_results, 1U);
 }
 
+TEST(OutputSchedule, APairThatWasTooOldIsLateWhateverWasInFlightBeforeIt) {
+  OutputSchedule::Config longer = config();
+  longer.latency = milliseconds(25);
+  Rig rig(longer);
+  rig.notice(1, 1, 0);
+  rig.notice(11, 2, -40);  // its stamp is of another clock: its slot ends here, before the first one's
+  rig.result(15, 1, 0);    // in flight: on time
+  rig.result(26, 2, -40);
+  rig.run_until(30);
+  EXPECT_EQ(rig.schedule.counters().from_past, 1U);
+  EXPECT_EQ(rig.schedule.counters().on_time, 1U);
+  EXPECT_EQ(rig.schedule.counters().late_results, 1U);
+}
+
 TEST(OutputSchedule, ALateNoticeGivesTheCadenceItsPhaseAndItsResultTheState) {
   Rig rig;
   rig.pair(1, 10);
