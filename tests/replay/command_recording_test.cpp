@@ -12,6 +12,7 @@
 #include "config/schema.hpp"
 #include "drivers/capture/synthetic/synthetic_source.hpp"
 #include "drivers/record/black_box.hpp"
+#include "drivers/record/output_note.hpp"
 #include "drivers/record/recording_source.hpp"
 #include "drivers/telemetry/encoder.hpp"
 #include "drivers/telemetry/file_sink.hpp"
@@ -78,9 +79,10 @@ class LiveRun {
     while (source_->next(pair) == capture::Next::kPair) {
       if (pair.ordinal % 17 == 5) continue;  // evicted
       box_->arm(pair);
-      const Result<FrameResult> result = pipeline_->run(pair);
+      const auto shed = static_cast<EffortBits>(pair.ordinal / 10 % 4);
+      const Result<FrameResult> result = pipeline_->run(pair, shed);
       ASSERT_TRUE(result.has_value());
-      box_->capture(pair, *result, {.shed = static_cast<std::uint8_t>(pair.ordinal / 10 % 4)});
+      box_->capture(pair, *result, {.shed = shed});
       if (pair.ordinal == trigger_at) box_->trigger(record::kDeadlineMiss);
       while (box_->keyframe_step(*pipeline_)) {
       }
@@ -113,21 +115,15 @@ class LiveRun {
 
  private:
   void send(telemetry::Encoder& encoder, const FramePair& pair, const FrameResult& result) {
-    record::OutputNote note;
-    note.ordinal = note.state_ordinal = pair.ordinal;
-    note.send_ns =
-        pair.capture_time.time_since_epoch().count() + 40'000'000 + static_cast<std::int64_t>(pair.ordinal) * 1237;
-    note.latency_ns = 40'000'000 + static_cast<std::int64_t>(pair.ordinal % 7) * 1000;
-    note.flags = pair.ordinal % 17 == 6 ? telemetry::kFramesSkippedBefore : 0U;
-    note.frames_skipped = static_cast<std::uint32_t>((pair.ordinal + 12) / 17);
+    const auto late = std::chrono::nanoseconds(static_cast<std::int64_t>(pair.ordinal) * 1237);
     telemetry::Message message;
     message.tracks = result.tracks;
     message.ordinal = pair.ordinal;
     message.capture_time = pair.capture_time;
-    message.send_time = CaptureTime(std::chrono::nanoseconds(note.send_ns));
-    message.latency = std::chrono::nanoseconds(note.latency_ns);
-    message.flags = note.flags;
-    message.frames_skipped = note.frames_skipped;
+    message.send_time = pair.capture_time + std::chrono::milliseconds(40) + late;
+    message.latency = std::chrono::milliseconds(40) + std::chrono::microseconds(pair.ordinal % 7);
+    message.flags = pair.ordinal % 17 == 6 ? telemetry::kFramesSkippedBefore : 0U;
+    message.frames_skipped = static_cast<std::uint32_t>((pair.ordinal + 12) / 17);
     message.unit_m = 1;
     message.focal_x_px = calibration_.left.fx;
     message.focal_y_px = calibration_.left.fy;
@@ -136,7 +132,8 @@ class LiveRun {
       kept.datagrams.emplace_back(datagram.begin(), datagram.end());
     }
     messages_.push_back(std::move(kept));
-    note.sequence = encoder.sequence();
+    record::OutputNote note = record::note_of(message, encoder.sequence());
+    note.state_ordinal = pair.ordinal;
     box_->note(note);
   }
 

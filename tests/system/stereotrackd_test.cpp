@@ -252,7 +252,7 @@ TEST(Stereotrackd, SighupNeverPutsARuleOnAnotherLine) {
   Ear second;
   const std::string beat = "[[signal]]\nname = \"beat\"\nline = \"sim:beat\"\nwhen = \"heartbeat\"\n";
   const std::string zone =
-      "[[zone]]\nname = \"nowhere\"\nz_m = [9000, 9001]\n"
+      "[[zone]]\nname = \"nowhere\"\nz_m = [900, 901]\n"
       "[[signal]]\nname = \"zone\"\nline = \"sim:zone\"\nwhen = \"in_zone\"\nzone = \"nowhere\"\n";
   const std::string figures = (folder / "figures.prom").string();
   const auto with = [&](const Ear& ear, const std::string& signals) {
