@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <malloc.h>
 #include <sched.h>
+#include <signal.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -17,6 +18,8 @@
 namespace stereotrack::runtime {
 
 namespace {
+
+constexpr std::size_t kFaultStackBytes = 32 * 1024;
 
 std::string reason(int error) { return std::strerror(error); }
 
@@ -53,6 +56,7 @@ RealTimeProcess::~RealTimeProcess() {
 
 Thread::Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> body)
     : plan_(plan), mode_(mode), body_(std::move(body)) {
+  fault_stack_ = std::make_unique<char[]>(kFaultStackBytes);
   plan_.name.resize(std::min<std::size_t>(plan_.name.size(), 15));
   pthread_attr_t attributes;
   if (pthread_attr_init(&attributes) != 0) throw std::runtime_error("thread " + plan.name + ": out of memory");
@@ -117,6 +121,10 @@ void* Thread::run(void* self) noexcept {
     touch_stack();
     (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
   }
+  stack_t faults{};
+  faults.ss_sp = thread.fault_stack_.get();
+  faults.ss_size = kFaultStackBytes;
+  (void)sigaltstack(&faults, nullptr);
   thread.may_begin_.acquire();
   thread.body_();
   return nullptr;

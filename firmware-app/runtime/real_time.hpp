@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <semaphore>
 #include <string>
 #include <vector>
@@ -57,6 +58,7 @@ class RealTimeProcess {
 
 /// A thread with policy, priority and core from its plan, a stack of known size that is present from the start, and a
 /// timer slack of 1 ns (the ordinary scheduler's timers may otherwise come 50 us late so that several wake together).
+/// Handlers with SA_ONSTACK have a stack of their own.
 /// Its body begins once all that is set. Starting never fails for want of a right: what was not granted is in
 /// missing(), and the thread runs without it.
 class Thread {
@@ -84,6 +86,7 @@ class Thread {
   RealTimeMode mode_;
   std::function<void()> body_;
   std::vector<Missing> missing_;
+  std::unique_ptr<char[]> fault_stack_;  ///< for handlers with SA_ONSTACK: of a fault that overflowed the stack
   std::binary_semaphore may_begin_{0};
   pthread_t thread_{};
   bool joined_ = false;

@@ -75,6 +75,9 @@ class Daemon {
   [[nodiscard]] record::BlackBox* black_box() noexcept { return box_.get(); }
   [[nodiscard]] const record::BlackBox* black_box() const noexcept { return box_.get(); }
 
+  /// SIGHUP's file was wrong.
+  void count_refused_reload() noexcept { vitals_->reloads_refused.add(); }
+
   [[nodiscard]] const Vitals& vitals() const noexcept { return *vitals_; }
   [[nodiscard]] capture::FramePool::Counters pool() const noexcept { return pool_.counters(); }
   [[nodiscard]] const gpio::OutputLines& lines() const noexcept { return lines_; }

@@ -93,6 +93,7 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
   text.counter("clock_steps_total", "Times that capture times moved against the monotonic clock.",
                vitals.clock_steps.get());
   text.family("allocations_total", "counter", "Heap calls of real-time threads after warm-up.");
+  text.value("{thread=\"capture\"}", vitals.capture_allocations.get());
   text.value("{thread=\"frames\"}", vitals.frame_allocations.get());
   text.value("{thread=\"publisher\"}", vitals.publisher_allocations.get());
 
@@ -110,6 +111,8 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
   text.value("{fate=\"sent\"}", vitals.telemetry_sent.get());
   text.value("{fate=\"dropped\"}", vitals.telemetry_dropped.get());
   text.value("{fate=\"failed\"}", vitals.telemetry_failed.get());
+  text.counter("reloads_refused_total", "Configurations that were wrong: the one that ran went on.",
+               vitals.reloads_refused.get());
   text.counter("reloads_total", "Configurations taken over while running.", vitals.reloads.get());
 
   if (daemon.lines().size() > 0) {

@@ -115,7 +115,7 @@ Panic::Panic(Daemon& daemon, const std::string& path) : path_(path) {
     throw std::runtime_error(path + ": " + std::strerror(errno) + ": give a directory that can be written to");
   struct sigaction action {};
   action.sa_handler = on_fault;
-  action.sa_flags = SA_NODEFER;
+  action.sa_flags = SA_NODEFER | SA_ONSTACK;
   for (const int signal : kFaults) (void)sigaction(signal, &action, nullptr);
 }
 

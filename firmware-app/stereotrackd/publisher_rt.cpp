@@ -290,7 +290,7 @@ void Publisher::judge_health() noexcept {
   tell_if(recordings != recordings_seen_, telemetry::kHealthRecordingDrops);
   recordings_seen_ = recordings;
   tell_if(!tai_.error.has_value(), telemetry::kHealthClockUnsynchronised);
-  tell_if(vitals_.frame_allocations.get() + vitals_.publisher_allocations.get() > 0, telemetry::kHealthAllocated);
+  tell_if(vitals_.allocations() > 0, telemetry::kHealthAllocated);
   misses_seen_ = misses;
   drops_seen_ = drops;
   lines_failed_seen_ = lines_failed;
@@ -319,7 +319,7 @@ void Publisher::send_status(MonotonicTime now) noexcept {
   status.outputs_overslept = outputs.overslept_pairs + outputs.overslept_missing;
   status.late_results = outputs.late_results;
   status.deadline_misses = misses_seen_;
-  status.allocations = vitals_.frame_allocations.get() + vitals_.publisher_allocations.get();
+  status.allocations = vitals_.allocations();
   status.telemetry_sent = vitals_.telemetry_sent.get();
   status.telemetry_dropped = vitals_.telemetry_dropped.get();
   status.telemetry_failed = vitals_.telemetry_failed.get();

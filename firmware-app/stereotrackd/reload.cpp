@@ -30,6 +30,7 @@ Reload reload(const std::string& file, const std::vector<std::string>& set, doub
   } catch (const std::exception& error) {
     log(LogLevel::kError, std::string("reload: refused, the running configuration stays: ") + error.what(),
         {{"STEREOTRACK_CAUSE", "reload"}});
+    daemon.count_refused_reload();
     return Reload::kRefused;
   }
 }

@@ -111,9 +111,7 @@ void Service::log_changes(const Daemon& daemon) {
     efforts_ = now;
     log(LogLevel::kNotice, "frames leave out: " + efforts_text(now), {{"STEREOTRACK_CAUSE", "effort"}});
   }
-  if (const std::uint64_t by =
-          changed(allocations_, vitals.frame_allocations.get() + vitals.publisher_allocations.get());
-      by > 0) {
+  if (const std::uint64_t by = changed(allocations_, vitals.allocations()); by > 0) {
     log(LogLevel::kError, std::to_string(by) + " heap calls in real-time threads", {{"STEREOTRACK_CAUSE", "heap"}});
   }
   if (const std::uint64_t by = changed(lines_failed_, vitals.lines_failed.get()); by > 0) {

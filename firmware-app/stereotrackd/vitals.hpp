@@ -42,6 +42,7 @@ static_assert(sizeof(runtime::OutputSchedule::Counters) == kScheduleCounters.siz
 struct Vitals {
   // ---- Capture thread
   Counter capture_beats;
+  Counter capture_allocations;  ///< heap calls after warm-up
 
   // ---- Frame loop
   Counter frame_beats;
@@ -78,6 +79,14 @@ struct Vitals {
   runtime::Histogram send_error;         ///< |sent - due|
   runtime::Histogram capture_to_send;
   runtime::Histogram line_set;  ///< from due to the lines' being set
+
+  // ---- Service
+  Counter reloads_refused;  ///< SIGHUPs whose file was wrong
+
+  /// Of all real-time threads.
+  [[nodiscard]] std::uint64_t allocations() const noexcept {
+    return capture_allocations.get() + frame_allocations.get() + publisher_allocations.get();
+  }
 };
 
 }  // namespace stereotrack::daemon

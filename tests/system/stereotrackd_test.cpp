@@ -352,7 +352,9 @@ TEST(Stereotrackd, ServesItsFiguresOverHttpAndInAFile) {
   EXPECT_NE(text.find("HTTP/1.1 200"), std::string::npos);
   EXPECT_NE(text.find("stereotrack_send_error_seconds{quantile=\"0.999\"}"), std::string::npos);
   EXPECT_NE(text.find("stereotrack_stage_seconds_count{stage=\"disparity\"}"), std::string::npos);
-  EXPECT_NE(text.find("stereotrack_allocations_total{thread=\"frames\"} 0\n"), std::string::npos);
+  for (const std::string thread : {"capture", "frames", "publisher"}) {
+    EXPECT_NE(text.find("stereotrack_allocations_total{thread=\"" + thread + "\"} 0\n"), std::string::npos) << thread;
+  }
   EXPECT_TRUE(wait_for([&] { return read_text(file).find("stereotrack_session 1\n") != std::string::npos; }));
   ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
   EXPECT_EQ(daemon.wait().exit_code, 0);

@@ -9,7 +9,9 @@
 
 #include <array>
 #include <atomic>
+#include <csignal>
 #include <fstream>
+#include <functional>
 #include <string>
 
 namespace stereotrack::runtime {
@@ -174,6 +176,28 @@ TEST(RealTimeProcess, LocksAllMemoryWhereItMay) {
   ASSERT_TRUE(WIFEXITED(status));
   if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "no right to lock memory: ulimit -l";
   EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+// As the daemon's handler of faults does: without the second stack the kernel could not call it at all.
+TEST(Thread, AHandlerOfFaultsRunsAlsoWhenItsStackHasOverflowed) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(
+      {
+        struct sigaction action {};
+        action.sa_handler = [](int) { _exit(7); };
+        action.sa_flags = SA_ONSTACK;
+        (void)sigaction(SIGSEGV, &action, nullptr);
+        Thread thread({.name = "deep"}, RealTimeMode::kOff, [] {
+          std::function<int(int)> deeper = [&deeper](int n) {
+            volatile char page[4096];
+            page[0] = static_cast<char>(n);
+            return deeper(n + 1) + page[0];
+          };
+          _exit(deeper(0) & 1);
+        });
+        thread.join();
+      },
+      testing::ExitedWithCode(7), "");
 }
 
 }  // namespace

@@ -174,6 +174,7 @@ TEST(Daemon, RealTimeThreadsMakeNoHeapCall) {
   EXPECT_GT(rig.daemon->vitals().frames.get(), FrameLoop::kWarmUpFrames);
   EXPECT_EQ(rig.daemon->vitals().frame_allocations.get(), 0U);
   EXPECT_EQ(rig.daemon->vitals().publisher_allocations.get(), 0U);
+  EXPECT_EQ(rig.daemon->vitals().capture_allocations.get(), 0U);
 }
 
 TEST(Daemon, LinesFollowTargetsAndAreSafeAtTheEnd) {
