@@ -22,10 +22,10 @@
 #include "firmware-app/stereotrackd/reload.hpp"
 #include "firmware-app/stereotrackd/service.hpp"
 
+namespace stereotrack {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace stereotrack;
 using daemon::log;
 using daemon::LogLevel;
 
@@ -215,9 +215,7 @@ int run(const Arguments& arguments) {
   return 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int parse_and_run(int argc, char** argv) {
   CLI::App app("Tracks moving objects with a stereo rig, in real time.", "stereotrackd");
   app.set_version_flag("--version", std::string("stereotrackd ") + STEREOTRACK_VERSION);
   Arguments arguments;
@@ -250,3 +248,8 @@ int main(int argc, char** argv) {
     return kFailed;
   }
 }
+
+}  // namespace
+}  // namespace stereotrack
+
+int main(int argc, char** argv) { return stereotrack::parse_and_run(argc, argv); }

@@ -30,7 +30,7 @@ class Service {
   };
 
   /// Blocks the signals that it reads, in this thread and all that begin later. Throws std::runtime_error.
-  Service(const Config& config);
+  explicit Service(const Config& config);
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
   ~Service();
