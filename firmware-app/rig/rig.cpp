@@ -19,6 +19,15 @@ config::Loaded load_configuration(const std::optional<std::string>& file, const 
   return config::load(layers);
 }
 
+void open_recording(const std::string& path, Rig& rig) {
+  auto recording = std::make_unique<record::RecordingSource>(path);
+  rig.calibration = recording->calibration();
+  rig.calibration_name = path;
+  rig.unit_m = recording->about().unit_m;
+  rig.recording = recording.get();
+  rig.source = std::move(recording);
+}
+
 void open_scene(const std::string& name, Rig& rig) {
   const config::Configuration& configuration = rig.configuration();
   capture::SyntheticOptions options;
@@ -54,19 +63,24 @@ void check_rig(Rig& rig) {
   if (rig.calibration) calibration::check_size(*rig.calibration, info.width, info.height, rig.calibration_name);
 }
 
-Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena, const StageObserver& observer) {
+Pipeline make_pipeline(const PipelineConfig& config, const StereoCalibration* calibration,
+                       const capture::SourceInfo& info, Arena& arena, const StageObserver& observer) {
   Pipeline::Setup setup;
   setup.width = info.width;
   setup.height = info.height;
   setup.colour = has_colour(info.format);
-  setup.calibration = info.stereo ? &*rig.calibration : nullptr;
+  setup.calibration = calibration;
   setup.observer = observer;
-  const Result<Pipeline> pipeline = Pipeline::create(rig.configuration().pipeline, setup, arena);
+  const Result<Pipeline> pipeline = Pipeline::create(config, setup, arena);
   if (!pipeline.has_value()) {
     throw std::runtime_error(info.name + ": no pipeline for pictures of " + std::to_string(info.width) + "x" +
                              std::to_string(info.height) + ": " + to_string(pipeline.error()));
   }
   return *pipeline;
+}
+
+Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena, const StageObserver& observer) {
+  return make_pipeline(rig.configuration().pipeline, info.stereo ? &*rig.calibration : nullptr, info, arena, observer);
 }
 
 void print_memory(std::ostream& out, const MemoryUse& memory) {

@@ -20,8 +20,9 @@ namespace stereotrack {
 inline constexpr std::string_view kSynthetic = "synthetic:";
 
 /// A source, its calibration and configuration, opened and checked against each other: what every program begins with.
-/// The functions fill it in this order: load_configuration(), then open_scene() or a source of the program's own and
-/// read_calibration(), then check_rig(). All throw config::Error (exit 2) or std::runtime_error (exit 1), one line.
+/// The functions fill it in this order: load_configuration(), then open_scene(), open_recording() (before
+/// the configuration, where it is to lie below) or a source of the program's own and read_calibration(), then
+/// check_rig(). All throw config::Error (exit 2) or std::runtime_error (exit 1), one line.
 struct Rig {
   config::Loaded loaded;
   std::unique_ptr<capture::FrameSource> source;
@@ -38,6 +39,9 @@ struct Rig {
                                                 const std::vector<std::string>& set,
                                                 std::vector<config::Layer> below = {});
 
+/// Opens a recording of ours, which brings its calibration and unit, and its configuration for who wants it.
+void open_recording(const std::string& path, Rig& rig);
+
 /// Draws synthetic:NAME, which brings its calibration, as [synthetic] and source.fps say.
 void open_scene(const std::string& name, Rig& rig);
 
@@ -47,7 +51,10 @@ void read_calibration(const std::string& path, const calibration::ReadOptions& o
 /// calibration.unit_m, keys in metres, and the size of the pictures.
 void check_rig(Rig& rig);
 
-/// The pipeline for what the source delivers. Throws std::runtime_error with the stage's fault in words.
+/// The pipeline for what a source delivers; `calibration` is null for mono. Throws std::runtime_error with the stage's
+/// fault in words.
+[[nodiscard]] Pipeline make_pipeline(const PipelineConfig& config, const StereoCalibration* calibration,
+                                     const capture::SourceInfo& info, Arena& arena, const StageObserver& observer = {});
 [[nodiscard]] Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena,
                                      const StageObserver& observer = {});
 

@@ -66,16 +66,11 @@ Rig open_rig(const RigArguments& arguments) {
   if (!file && !synthetic && fs::exists(folder / "stereotrack.toml")) file = (folder / "stereotrack.toml").string();
   std::vector<config::Layer> below;
   if (record::is_recording(arguments.source)) {
-    auto recording = std::make_unique<record::RecordingSource>(arguments.source);
+    open_recording(arguments.source, rig);
     if (!arguments.config) {
       file.reset();
-      below.push_back(config::text_layer(arguments.source, recording->configuration()));
+      below.push_back(config::text_layer(arguments.source, rig.recording->configuration()));
     }
-    rig.calibration = recording->calibration();
-    rig.calibration_name = arguments.source;
-    rig.unit_m = recording->about().unit_m;
-    rig.recording = recording.get();
-    rig.source = std::move(recording);
   }
   rig.loaded = load_configuration(file, arguments.set, std::move(below));
   const config::Configuration& configuration = rig.configuration();

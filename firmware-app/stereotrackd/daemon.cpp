@@ -7,6 +7,7 @@
 
 #include "config/error.hpp"
 #include "config/schema.hpp"
+#include "firmware-app/rig/rig.hpp"
 #include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/stereotrackd/log.hpp"
 
@@ -125,17 +126,8 @@ Daemon::Daemon(Parts parts)
                                                           .period = info.period,
                                                           .also = parts.also},
                                         *effort, pool_, *mailbox_, bell_, *source_, *vitals_);
-  const Pipeline::Setup setup{.width = info.width,
-                              .height = info.height,
-                              .colour = has_colour(info.format),
-                              .calibration = parts.calibration,
-                              .observer = frames_->observer()};
-  const Result<Pipeline> pipeline = Pipeline::create(configuration.pipeline, setup, arena_);
-  if (!pipeline.has_value()) {
-    throw std::runtime_error(info.name + ": no pipeline for pictures of " + std::to_string(info.width) + "x" +
-                             std::to_string(info.height) + ": " + to_string(pipeline.error()));
-  }
-  pipeline_ = std::make_unique<Pipeline>(*pipeline);
+  pipeline_ = std::make_unique<Pipeline>(
+      make_pipeline(configuration.pipeline, parts.calibration, info, arena_, frames_->observer()));
   arena_.seal();
   if (configuration.record.on) {
     record::BlackBox::Run run;

@@ -54,12 +54,8 @@ std::unique_ptr<capture::LiveSource> open_source(Rig& rig) {
   if (source.name.starts_with(kSynthetic)) {
     open_scene(source.name, rig);
   } else if (record::is_recording(source.name)) {
-    auto recording = std::make_unique<record::RecordingSource>(source.name);
-    if (!recording->warning().empty()) log(LogLevel::kWarning, recording->warning());
-    rig.calibration = recording->calibration();
-    rig.calibration_name = source.name;
-    rig.unit_m = recording->about().unit_m;
-    rig.source = std::move(recording);
+    open_recording(source.name, rig);
+    if (!rig.recording->warning().empty()) log(LogLevel::kWarning, rig.recording->warning());
   } else {
     throw config::error_at(rig.loaded.origins, "source.name",
                            source.name.empty()
@@ -73,6 +69,7 @@ std::unique_ptr<capture::LiveSource> open_source(Rig& rig) {
   auto film = std::make_unique<capture::Film>(
       *rig.source, capture::Film::Config{.repeat = repeat_of(source.repeat),
                                          .most_bytes = static_cast<std::uint64_t>(source.memory_mb) << 20});
+  rig.recording = nullptr;
   rig.source.reset();
   return film;
 }
