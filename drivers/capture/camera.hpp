@@ -1,0 +1,97 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "pipeline/core/time.hpp"
+#include "pipeline/frame.hpp"
+
+namespace stereotrack::capture {
+
+/// What one sensor delivers, known once it is open.
+struct CameraInfo {
+  std::string name;   ///< as the user wrote it, for messages
+  std::string model;  ///< what the driver calls it, and where it is plugged in
+  int width = 0;      ///< [px]
+  int height = 0;     ///< [px]
+  PixelFormat format = PixelFormat::kGrey8;
+  std::chrono::nanoseconds period{0};  ///< nominal time between frames, as the driver keeps it
+  std::size_t buffers = 0;             ///< that the driver and we pass to and fro
+  bool counts_lost = false;            ///< SensorFrame::sequence counts frames that were lost, too
+};
+
+/// What a frame was exposed with, as far as the driver tells.
+struct SensorSettings {
+  std::optional<std::chrono::nanoseconds> exposure;
+  std::optional<float> gain;  ///< 1 = none
+};
+
+/// One frame in one buffer of the driver.
+struct SensorFrame {
+  CaptureTime mid_exposure{};  ///< middle of the exposure, on the camera's clock: Camera::clock_map()
+  MonotonicTime arrived{};     ///< when it was taken
+  std::uint64_t sequence = 0;  ///< the sensor's own count, its wrap-around undone
+  std::uint32_t buffer = 0;
+  bool damaged = false;     ///< the driver says that its pixels are not to be trusted; give it back
+  SensorSettings settings;  ///< in force when it was exposed
+};
+
+/// One sensor's stream, whoever delivers it. Its buffers are the driver's: a frame that was taken stays where the
+/// driver put it until give_back() names its buffer, in any order.
+///
+/// A factory opens it, sets format and controls and throws std::runtime_error with one line naming the device and the
+/// way out. start() and the destructor belong to the thread that may wait and allocate; what stands below "Capture
+/// thread" to that thread alone, from start() to its end. A camera that is gone never comes back: another is opened.
+class Camera {
+ public:
+  enum class Take : std::uint8_t {
+    kFrame,    ///< `frame` is ours now
+    kNothing,  ///< none waits
+    kLost,     ///< the stream is over, for a reason: failure(). Unplugged, or the driver's fault
+  };
+
+  struct Counters {
+    std::uint64_t frames = 0;   ///< taken
+    std::uint64_t damaged = 0;  ///< of these
+    std::uint64_t lost = 0;     ///< gaps in the sequence
+    std::uint64_t late = 0;     ///< frames whose driver had no buffer to fill, where it tells
+  };
+
+  Camera() = default;
+  Camera(const Camera&) = delete;
+  Camera& operator=(const Camera&) = delete;
+  virtual ~Camera() = default;
+
+  [[nodiscard]] virtual const CameraInfo& info() const noexcept = 0;
+
+  /// Queues all buffers and begins to stream. Throws std::runtime_error, one line.
+  virtual void start() = 0;
+
+  // ---- Capture thread; no lock, no heap
+
+  /// Readable, for poll(2), when take() will not answer kNothing.
+  [[nodiscard]] virtual int descriptor() const noexcept = 0;
+
+  /// The oldest frame that waits. Does not wait itself.
+  [[nodiscard]] virtual Take take(SensorFrame& frame) noexcept = 0;
+
+  /// The driver may fill the buffer again.
+  virtual void give_back(std::uint32_t buffer) noexcept = 0;
+
+  /// What the buffer of a frame that was taken shows.
+  [[nodiscard]] virtual Picture picture(std::uint32_t buffer) const noexcept = 0;
+
+  /// After kLost: one line naming the device, the cause and the way out. Written once, before take() first says kLost.
+  [[nodiscard]] virtual const std::string& failure() const noexcept = 0;
+
+  // ---- Any thread
+
+  /// Where its capture times lie on the monotonic clock.
+  [[nodiscard]] virtual ClockMap clock_map() const noexcept = 0;
+  [[nodiscard]] virtual Counters counters() const noexcept = 0;
+};
+
+}  // namespace stereotrack::capture
