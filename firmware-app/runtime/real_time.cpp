@@ -65,7 +65,12 @@ Thread::Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> 
   (void)pthread_attr_destroy(&attributes);
   if (made != 0) throw std::runtime_error("thread " + plan.name + ": " + reason(made));
   set_up();
-  may_begin_.release();
+}
+
+void Thread::begin() noexcept {
+  if (begun_ || joined_) return;
+  begun_ = true;
+  decided_.release();
 }
 
 // From outside, while the thread waits: who starts it must know what is missing before it goes on.
@@ -98,11 +103,16 @@ void Thread::set_up() {
 void Thread::join() noexcept {
   if (joined_) return;
   joined_ = true;
+  if (!begun_) decided_.release();
   (void)pthread_join(thread_, nullptr);
 }
 
 bool Thread::join_for(std::chrono::milliseconds limit) noexcept {
   if (joined_) return true;
+  if (!begun_) {
+    join();
+    return true;
+  }
   timespec until{};
   (void)clock_gettime(CLOCK_REALTIME, &until);  // the clock that pthread_timedjoin_np knows
   until.tv_sec += limit.count() / 1000;
@@ -125,8 +135,8 @@ void* Thread::run(void* self) noexcept {
   faults.ss_sp = thread.fault_stack_.get();
   faults.ss_size = kFaultStackBytes;
   (void)sigaltstack(&faults, nullptr);
-  thread.may_begin_.acquire();
-  thread.body_();
+  thread.decided_.acquire();
+  if (thread.begun_) thread.body_();
   return nullptr;
 }
 

@@ -59,19 +59,23 @@ class RealTimeProcess {
 /// A thread with policy, priority and core from its plan, a stack of known size that is present from the start, and a
 /// timer slack of 1 ns (the ordinary scheduler's timers may otherwise come 50 us late so that several wake together).
 /// Handlers with SA_ONSTACK have a stack of their own.
-/// Its body begins once all that is set. Starting never fails for want of a right: what was not granted is in
-/// missing(), and the thread runs without it.
+/// All that is set when the constructor returns, and the thread waits: its owner can look at missing() of all its
+/// threads before any of them begins. Making one never fails for want of a right: begin() lets it run without it.
 class Thread {
  public:
   static constexpr std::size_t kStackBytes =
       512 * 1024;  ///< locked and prefaulted: a gigabyte of default stacks is not
 
-  /// Starts at once. Throws std::runtime_error where the system has no thread to give.
+  /// Throws std::runtime_error where the system has no thread to give.
   Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> body);
   Thread(const Thread&) = delete;
   Thread& operator=(const Thread&) = delete;
   ~Thread() { join(); }
 
+  /// The body runs. Once.
+  void begin() noexcept;
+
+  /// Waits for the body's end; one that was not begun never runs.
   void join() noexcept;
   /// The same for so long at most. False: it still runs; join() waits for it yet.
   [[nodiscard]] bool join_for(std::chrono::milliseconds limit) noexcept;
@@ -87,7 +91,8 @@ class Thread {
   std::function<void()> body_;
   std::vector<Missing> missing_;
   std::unique_ptr<char[]> fault_stack_;  ///< for handlers with SA_ONSTACK: of a fault that overflowed the stack
-  std::binary_semaphore may_begin_{0};
+  std::binary_semaphore decided_{0};     ///< released once: begin(), or an end without it
+  bool begun_ = false;
   pthread_t thread_{};
   bool joined_ = false;
 };

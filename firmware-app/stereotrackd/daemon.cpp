@@ -155,23 +155,29 @@ Daemon::~Daemon() { stop(); }
 std::vector<runtime::Missing> Daemon::start(const config::RealTimeConfig& real_time, bool missing_before) {
   const runtime::RealTimeMode mode = mode_of(real_time.mode);
   std::vector<runtime::Missing> missing;
-  const auto begin = [&](const char* name, const config::ThreadConfig& config, std::function<void()> body) {
-    threads_.push_back(std::make_unique<runtime::Thread>(plan_of(name, config), mode, std::move(body)));
-    const auto& lacks = threads_.back()->missing();
-    missing.insert(missing.end(), lacks.begin(), lacks.end());
+  const auto make = [&](const char* name, const config::ThreadConfig& config, std::function<void()> body) {
+    auto thread = std::make_unique<runtime::Thread>(plan_of(name, config), mode, std::move(body));
+    missing.insert(missing.end(), thread->missing().begin(), thread->missing().end());
+    return thread;
   };
   // Who takes before who gives.
   if (box_) {
     // A thread of its own: a disk that hangs must not keep the main thread from ending the daemon.
-    recorder_ =
-        std::make_unique<runtime::Thread>(plan_of("st-recorder", real_time.service), mode, [this] { record(); });
-    missing = recorder_->missing();
+    recorder_ = make("st-recorder", real_time.service, [this] { record(); });
   }
-  begin("st-publisher", real_time.publisher, [this] { publisher_->run(capture_end_.ended, stop_publisher_); });
-  begin("st-frames", real_time.frames, [this] { frames_->run(*pipeline_, stop_capture_); });
-  begin("st-capture", real_time.capture,
-        [this] { capture(*source_, outlet_, pool_, *vitals_, capture_end_, stop_capture_); });
+  threads_.push_back(
+      make("st-publisher", real_time.publisher, [this] { publisher_->run(capture_end_.ended, stop_publisher_); }));
+  threads_.push_back(make("st-frames", real_time.frames, [this] { frames_->run(*pipeline_, stop_capture_); }));
+  threads_.push_back(make("st-capture", real_time.capture,
+                          [this] { capture(*source_, outlet_, pool_, *vitals_, capture_end_, stop_capture_); }));
+  if (mode == runtime::RealTimeMode::kEnforce && !missing.empty()) {
+    threads_.clear();
+    recorder_.reset();
+    return missing;
+  }
   if (missing_before || !missing.empty()) publisher_->say_always(telemetry::kHealthNotRealTime);
+  if (recorder_) recorder_->begin();
+  for (const auto& thread : threads_) thread->begin();
   return missing;
 }
 

@@ -96,8 +96,9 @@ void Publisher::take_plan() noexcept {
     next->rules = plan_->rules;
     next->zones = plan_->zones;
   }
-  retired_.store(plan_.release(), std::memory_order_release);
-  plan_.reset(next);
+  std::unique_ptr<Plan> mine(next);
+  plan_.swap(mine);
+  retired_.store(mine.release(), std::memory_order_release);  // not freed here
   vitals_.reloads.add();
 }
 

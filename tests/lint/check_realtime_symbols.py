@@ -1,13 +1,19 @@
 #!/usr/bin/env python3
-"""Proves at link level what the frame loop may call: check_realtime_symbols.py [--root NAME] OBJECT...
+"""Proves at link level what real-time threads may call: check_realtime_symbols.py [--threads] [--root NAME] OBJECT...
 
-The objects are those of pipeline/, compiled with -ffunction-sections -fdata-sections, so that each function and each
-table is a section of its own and each call, each address taken, is a relocation. From Pipeline::run the relocations
-are walked from section to section. What is reached must be a section of these objects or a symbol on the short list
-LOOP below. What only create() or the program's start reaches may besides use SET_UP. Nothing else may be referenced
-at all: no heap, lock, thread, clock, file, stream, locale, std::function, exception or guarded static.
+The objects are compiled with -ffunction-sections -fdata-sections, so that each function and each table is a section of
+its own and each call, each address taken, is a relocation. From the roots the relocations are walked from section to
+section. What is reached must be a section of these objects or a symbol on a short list.
 
-Not seen: what a caller's function pointer does (StageObserver), and what a symbol of the list does inside its library.
+Without --threads: the objects of pipeline/, from Pipeline::run, and the list LOOP. What only create() or the program's
+start reaches may besides use SET_UP. Nothing else may be referenced at all: no heap, lock, thread, clock, file, stream,
+locale, std::function, exception or guarded static.
+
+With --threads: those and the rooms around them, from the bodies of the daemon's threads and the functions that they
+call through a table (ROOTS_OF_THREADS, each of which must be there), and the list LOOP and THREADS: a clock, a sleep,
+a futex, a datagram, a line. What only the start reaches is not judged.
+
+Not seen: what a function pointer does that is no root, and what a symbol of the list does inside its library.
 A breach is one line, OBJECT: FUNCTION: calls SYMBOL, with the way that leads there from the root. Exit 1 if there is
 any, 2 if an object cannot be judged. test_realtime_symbols.py breaks each rule.
 """
@@ -20,6 +26,18 @@ import subprocess
 import sys
 
 ROOT = "stereotrack::Pipeline::run("
+ROOTS_OF_THREADS = [
+    "stereotrack::daemon::capture(",
+    "stereotrack::daemon::FrameLoop::run(",
+    "stereotrack::daemon::Publisher::run(",
+    # Through a table, or a pointer.
+    "stereotrack::daemon::FrameLoop::stage_ended(",
+    "stereotrack::capture::Film::step(",
+    "stereotrack::capture::Film::clock_map(",
+    "stereotrack::telemetry::UdpSender::send(",
+    "stereotrack::gpio::gpiod::(anonymous namespace)::Request::set(",
+    "stereotrack::gpio::simulated_chip::(anonymous namespace)::Request::set(",
+]
 
 # Demangled names in full.
 LOOP = [
@@ -35,6 +53,17 @@ SET_UP = [
     r"operator new\(unsigned (long|int), std::align_val_t, std::nothrow_t const&\)",  # Arena
     r"operator delete\(void\*, std::align_val_t\)",
     r"std::nothrow",
+]
+
+THREADS = [
+    r"clock_gettime|clock_nanosleep|adjtimex",
+    r"syscall|poll|sendto|sendmsg|write|ioctl",  # futexes, datagrams, lines
+    r"__errno_location",
+    r"stereotrack::allocations_of_this_thread\(\)",  # the program's own count
+    r"pb_(encode|get_encoded_size|ostream_from_buffer)",  # nanopb: into the caller's memory, no heap
+    r"stereotrack_Datagram_msg",                          # its table of the schema
+    r"crypto_generichash",  # libsodium: no heap
+    r"gpiod_line_set_value_bulk|gpiod_line_request_set_values",  # one ioctl
 ]
 
 SHF_ALLOC = 2
@@ -137,13 +166,14 @@ class Program:
     def label(self, place):
         return self.labels.get(place) or place[0].sections[place[1]]
 
-    def reach(self, root):
-        """All places that the functions named `root`... lead to: place -> the place that it was found from."""
+    def reach(self, roots):
+        """All places that the functions named so... lead to: place -> the place that it was found from."""
         found = {}
-        for o in self.objects:
-            for s in o.functions():
-                if self.plain[s.name].startswith(root):
-                    found.setdefault((o, s.section), None)
+        for root in roots:
+            places = {(o, s.section) for o in self.objects for s in o.functions() if self.plain[s.name].startswith(root)}
+            if not places:
+                raise BadObject(f"no function {root}...) in these objects: nothing to begin at")
+            found.update((place, None) for place in places)
         queue = collections.deque(found)
         while queue:
             place = queue.popleft()
@@ -168,10 +198,8 @@ def short(name):
         name = shorter
 
 
-def findings(program, root):
-    reached = program.reach(root)
-    if not reached:
-        raise BadObject(f"no function {root}...) in these objects: nothing to begin at")
+def findings(program, reached, allowed_there, allowed_else):
+    """`allowed_else`: of what is not reached; None: that is not judged."""
     for o in program.objects:
         # Calls inside a section have no relocation: the walk would miss them.
         if any(o.sections[s.section] == ".text" for s in o.functions()):
@@ -180,7 +208,9 @@ def findings(program, root):
             place = (o, section)
             if o.sections[section].startswith((".eh_frame", ".note", ".ARM.ex")):
                 continue
-            allowed = LOOP if place in reached else LOOP + SET_UP
+            allowed = allowed_there if place in reached else allowed_else
+            if allowed is None:
+                continue
             for symbol in program.outside(o, section):
                 if on_list(symbol, allowed):
                     continue
@@ -195,25 +225,28 @@ def findings(program, root):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=ROOT, help="the frame loop's function, demangled, up to its '('")
+    parser.add_argument("--root", help="begin at this function instead, demangled, up to its '('")
+    parser.add_argument("--threads", action="store_true", help="of the daemon's threads, not of the frame loop alone")
     parser.add_argument("--list", action="store_true", help="show what is reached outside, and end")
     parser.add_argument("objects", nargs="+")
     arguments = parser.parse_args()
+    roots = [arguments.root] if arguments.root else ROOTS_OF_THREADS if arguments.threads else [ROOT]
     try:
         program = Program([ObjectFile(path) for path in arguments.objects])
-        reached = program.reach(arguments.root)
+        reached = program.reach(roots)
         if arguments.list:
             for symbol in sorted({s for o, section in reached for s in program.outside(o, section)}):
                 print(symbol)
             return 0
-        breaches = list(findings(program, arguments.root))
+        lists = (LOOP + THREADS, None) if arguments.threads else (LOOP, LOOP + SET_UP)
+        breaches = list(findings(program, reached, *lists))
     except BadObject as error:
         print(f"check_realtime_symbols.py: {error}", file=sys.stderr)
         return 2
     for breach in breaches:
         print(breach)
     functions = sum(1 for place in reached if place in program.labels)
-    print(f"real time: {len(program.objects)} objects, {functions} functions of the frame loop, {len(breaches)} breaches")
+    print(f"real time: {len(program.objects)} objects, {functions} functions reached, {len(breaches)} breaches")
     return 1 if breaches else 0
 
 

@@ -153,9 +153,9 @@ class Snippets(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         return out
 
-    def check(self, *objects, root="loop("):
-        return subprocess.run([sys.executable, SCRIPT, "--root", root, *objects], capture_output=True, text=True,
-                              check=False)
+    def check(self, *objects, root="loop(", threads=False):
+        return subprocess.run([sys.executable, SCRIPT, *["--threads"] * threads, "--root", root, *objects],
+                              capture_output=True, text=True, check=False)
 
     def test_each_breach_is_refused_by_name(self):
         for name, (code, said) in BAD.items():
@@ -184,10 +184,37 @@ class Snippets(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("calls far(int)", done.stdout)
 
+    def test_threads_may_sleep_and_send_and_their_set_up_may_do_anything(self):
+        code = """
+#include <ctime>
+#include <sys/socket.h>
+#include <vector>
+int loop(int a) {
+  timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
+  return sendto(a, &t, sizeof t, 0, nullptr, 0);
+}
+std::vector<int> create(int a) { return std::vector<int>(a); }
+"""
+        done = self.check(self.compile(code), threads=True)
+        self.assertEqual((done.returncode, done.stderr), (0, ""), done.stdout)
+        self.assertEqual(self.check(self.compile(code)).returncode, 1)
+
+    def test_threads_are_refused_what_may_wait_for_others(self):
+        for name in ("new", "delete", "malloc", "vector", "mutex", "condition variable", "printf", "throw", "file"):
+            code, said = BAD[name]
+            with self.subTest(name=name):
+                done = self.check(self.compile(code), threads=True)
+                self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+                self.assertIn(said, done.stdout)
+
     def test_objects_that_cannot_be_judged_are_refused(self):
         good = "int loop(int a) { return a; }\nint main() { return loop(3); }"
         for name, done in {
             "no root": self.check(self.compile(good), root="other("),
+            "threads that are not there": subprocess.run([sys.executable, SCRIPT, "--threads", self.compile(good)],
+                                                         capture_output=True, text=True, check=False),
             "one section for all functions": self.check(self.compile(good, flags=("-c",))),
             "a program": self.check(self.compile(good, flags=SECTIONS)),
             "no object": self.check(SCRIPT),

@@ -11,6 +11,7 @@ Witness::Witness(int core) {
   oversleeps_.reserve(1'000'000);
   thread_ = std::make_unique<runtime::Thread>(runtime::ThreadPlan{"witness-" + std::to_string(core), kPriority, core},
                                               runtime::RealTimeMode::kTry, [this] { run(); });
+  thread_->begin();
 }
 
 void Witness::stop() noexcept {

@@ -55,10 +55,22 @@ TEST(Thread, RunsItsBodyOnce) {
   std::atomic<int> runs = 0;
   {
     Thread thread({.name = "once"}, RealTimeMode::kOff, [&] { ++runs; });
+    thread.begin();
     thread.join();
     EXPECT_EQ(runs, 1);
   }
   EXPECT_EQ(runs, 1);
+}
+
+TEST(Thread, WaitsUntilItIsToldToBegin) {
+  std::atomic<bool> ran = false;
+  {
+    const Thread thread({.name = "waiting"}, RealTimeMode::kOff, [&] { ran = true; });
+  }
+  Thread ended({.name = "waiting"}, RealTimeMode::kOff, [&] { ran = true; });
+  EXPECT_TRUE(ended.join_for(std::chrono::milliseconds(0)));
+  ended.begin();
+  EXPECT_FALSE(ran);
 }
 
 TEST(Thread, HasItsNameItsStackAndItsTimerSlack) {
@@ -75,6 +87,7 @@ TEST(Thread, HasItsNameItsStackAndItsTimerSlack) {
     (void)pthread_attr_destroy(&attributes);
     slack = prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL);
   });
+  thread.begin();
   thread.join();
   EXPECT_EQ(name, "a name that is ");
   EXPECT_EQ(stack, Thread::kStackBytes);
@@ -86,6 +99,7 @@ TEST(Thread, OffLeavesTheSystemsTimerSlack) {
   int slack = 0;
   Thread thread({.name = "off", .priority = 50, .core = 0}, RealTimeMode::kOff,
                 [&] { slack = prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL); });
+  thread.begin();
   thread.join();
   EXPECT_EQ(slack, usual);
   EXPECT_TRUE(thread.missing().empty());
@@ -104,6 +118,7 @@ TEST(Thread, HasPolicyPriorityAndCoreOfItsPlan) {
     core = sched_getcpu();
     looked = true;
   });
+  thread.begin();
   thread.join();
   EXPECT_TRUE(looked);
   EXPECT_EQ(words(thread.missing()), "");
@@ -123,6 +138,7 @@ TEST(Thread, PriorityThatIsNotGrantedIsNamedAndTheBodyRuns) {
   const std::string said = as_nobody([] {
     bool ran = false;
     Thread thread({.name = "frames", .priority = 60}, RealTimeMode::kTry, [&] { ran = true; });
+    thread.begin();
     thread.join();
     return words(thread.missing()) + (ran ? "ran" : "did not run");
   });
@@ -195,6 +211,7 @@ TEST(Thread, AHandlerOfFaultsRunsAlsoWhenItsStackHasOverflowed) {
           };
           _exit(deeper(0) & 1);
         });
+        thread.begin();
         thread.join();
       },
       testing::ExitedWithCode(7), "");

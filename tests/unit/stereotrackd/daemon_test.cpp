@@ -62,6 +62,21 @@ TEST(Daemon, EachPairLeavesOnceStampedWithTheMomentOfTheContract) {
   EXPECT_TRUE(rig.daemon->failure().empty());
 }
 
+TEST(Daemon, EnforceBeginsNothingWhereAThreadIsNotGrantedWhatItIsToHave) {
+  LiveRig rig(film_of_scene(1, 80, kPeriod), kLatency);
+  config::RealTimeConfig wanted = rig.configuration.realtime;
+  wanted.mode = config::RealTimeMode::kEnforce;
+  for (config::ThreadConfig* thread : {&wanted.publisher, &wanted.capture, &wanted.frames}) *thread = {};
+  wanted.capture.core = 1023;
+  const std::vector<runtime::Missing> missing = rig.daemon->start(wanted, false);
+  ASSERT_EQ(missing.size(), 1U);
+  EXPECT_NE(missing[0].what.find("thread st-capture: core 1023: "), std::string::npos) << missing[0].what;
+  std::this_thread::sleep_for(2 * kPeriod);
+  EXPECT_EQ(rig.daemon->vitals().capture_beats.get(), 0U);
+  EXPECT_EQ(rig.daemon->pool().captured, 0U);
+  EXPECT_TRUE(rig.daemon->stop());
+}
+
 TEST(Daemon, TargetsLeaveAsTheyAreExpectedAtTheMomentOfLeaving) {
   LiveRig rig(film_of_scene(20, 120, kPeriod), kLatency);
   rig.run();
