@@ -51,6 +51,9 @@ TEST(Lines, TenThousandOutputsMakeNoHeapCall) {
   std::uint64_t heap_calls = 0;
   for (int i = 0; i < 10'000; ++i) {
     if (i == 5000 || i == 5100) gpio::simulated_chip::set_gone("rt0", i == 5000);
+    if (i == 5100) {
+      EXPECT_EQ(lines.reopen(), 0b111111U);
+    }
     for (std::size_t k = 0; k < targets.size(); ++k) {
       targets[k].position = {0.1 * static_cast<double>(k), 0, 6 + 5 * ((i / 40) % 2 == 0 ? 1.0 : -1.0)};
       targets[k].velocity = {0, 0, -1};
@@ -76,6 +79,7 @@ TEST(Lines, TenThousandOutputsMakeNoHeapCall) {
   EXPECT_EQ(heap_calls, 0U);
   EXPECT_EQ(ever_changed, 0b111111U) << "all lines moved";
   EXPECT_EQ(ever_failed, 0b111111U) << "and their chip was gone for a while";
+  EXPECT_EQ(lines.gone(), 0U) << "and came back";
 }
 
 }  // namespace

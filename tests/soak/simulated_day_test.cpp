@@ -471,7 +471,9 @@ class Day {
   }
 
   void drive(gpio::LineBits lines, MonotonicTime now) {
-    if (lines_.set(lines, now).failed != 0) ++lines_failed_;
+    if (lines_.set(lines, now).failed == 0) return;
+    ++lines_failed_;
+    static_cast<void>(lines_.reopen());  // the service's business
   }
 
   static constexpr std::size_t kPlans = 64;
