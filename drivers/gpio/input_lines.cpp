@@ -87,7 +87,7 @@ struct InputLines::State {
     gone |= chip.mine;
     ++outages;
     try {
-      why = "GPIO line " + to_string(chip.wanted.front().spec.name) + ": " + std::generic_category().message(error);
+      why = std::generic_category().message(error);
     } catch (const std::exception&) {
       why.clear();
     }

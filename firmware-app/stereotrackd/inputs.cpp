@@ -73,7 +73,7 @@ void Inputs::exchange(Setup setup) {
     setup_ = std::move(setup);
     return;
   }
-  if (lines_.gone() != 0) throw std::runtime_error(lines_.why() + "; lines change once it is back");
+  if (lines_.gone() != 0) throw std::runtime_error("a chip is gone: " + lines_.why() + ": they change once it is back");
   // Lines of before would be busy for those to come.
   begin(setup_, gpio::InputLines());
   try {

@@ -142,7 +142,7 @@ TEST(InputLines, AChipThatWentIsToldAndComesBack) {
   EXPECT_FALSE(is_readable(lines));
   EXPECT_EQ(lines.gone(), 0b11U);
   EXPECT_EQ(lines.outages(), 1U);
-  EXPECT_NE(lines.why().find("GPIO line sim:cable: "), std::string::npos) << lines.why();
+  EXPECT_EQ(lines.why(), "No such device");
   lines.probe();
   EXPECT_EQ(lines.outages(), 1U);
   EXPECT_EQ(lines.reopen(), 0U);
