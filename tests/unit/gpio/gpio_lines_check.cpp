@@ -1,15 +1,14 @@
-// What no machine without GPIO chips can show: whether edges of real lines come through libgpiod, once each, in order,
-// with stamps of CLOCK_MONOTONIC, and whether a chip that is unplugged comes back. No test of ctest's, which has no
-// chip: run it by hand on a board, and in the guest of the emulated one, for each libgpiod that is supported.
+// What no machine without GPIO chips shows: whether edges of real lines come through libgpiod, once each, in order,
+// with stamps of CLOCK_MONOTONIC, and whether a chip that is unplugged comes back. ctest has no chip and runs it on the
+// simulated one: run it by hand on a board, and in the guest of the emulated one, for each libgpiod that is supported.
 //
-//     gpio_lines_check CHIP OUT_LINE IN_LINE                         OUT_LINE is wired to IN_LINE by a jumper
-//     gpio_lines_check CHIP OUT_LINE IN_LINE DEVICE                  lines of gpio-sim, by their numbers; DEVICE is
-//                                                                    /sys/devices/platform/gpio-sim.0: this is the wire
-//     gpio_lines_check CHIP OUT_LINE IN_LINE DEVICE CONFIG           besides pulls the chip out and plugs it in: CONFIG
-//     is
-//                                                                    /sys/kernel/config/gpio-sim/NAME; CHIP is a label,
-//                                                                    since the chip's number may change
-//     gpio_lines_check sim A B                                       the simulated chip: whether this program is right
+//     gpio_lines_check CHIP OUT_LINE IN_LINE                   OUT_LINE is wired to IN_LINE by a jumper
+//     gpio_lines_check CHIP OUT_LINE IN_LINE DEVICE            numbers of lines of gpio-sim; DEVICE is its folder,
+//                                                              /sys/devices/platform/gpio-sim.0: this is the wire
+//     gpio_lines_check CHIP OUT_LINE IN_LINE DEVICE CONFIG     besides pulls the chip out and plugs it in: CONFIG is
+//                                                              /sys/kernel/config/gpio-sim/NAME; CHIP is a label, as
+//                                                              the chip's number may change
+//     gpio_lines_check sim A B                                 the simulated chip: whether this program is right
 //
 // Prints a line for each fact; exit code 0 if all hold.
 #include <poll.h>
@@ -196,7 +195,8 @@ class Check {
     expect(edges.gone() == 1, std::string("an input that went is noticed, ") + (woken ? "by waking" : "by probing"));
     expect(lines.refresh(now()).failed == 1 && lines.gone() == 1, "an output that went is noticed");
     std::string why;
-    expect(edges.reopen() == 0 && lines.reopen(&why) == 0, "neither comes back meanwhile: " + why);
+    const bool away = edges.reopen() == 0 && lines.reopen(&why) == 0;
+    expect(away, "neither comes back meanwhile: " + why);
     plug(true);
     expect(edges.reopen() == 1 && edges.gone() == 0, "the input is back");
     expect(lines.reopen(&why) == 1, "the output is back");
