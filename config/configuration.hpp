@@ -143,6 +143,21 @@ struct SignalConfig {
   friend bool operator==(const SignalConfig&, const SignalConfig&) = default;
 };
 
+enum class InputEdge : unsigned char { kRising, kFalling, kBoth };
+enum class InputBias : unsigned char { kAsIs, kNone, kPullUp, kPullDown };
+
+/// [[input]]: a line whose edges something follows from. See drivers/gpio/input_lines.hpp.
+struct InputConfig {
+  std::string name;
+  std::string line;  ///< CHIP:LINE, see drivers/gpio/line.hpp
+  InputEdge edge = InputEdge::kRising;
+  ActiveLevel active = ActiveLevel::kHigh;
+  InputBias bias = InputBias::kAsIs;
+  double debounce_ms = 0;  ///< [ms]
+  double apart_ms = 1000;  ///< [ms]
+  friend bool operator==(const InputConfig&, const InputConfig&) = default;
+};
+
 /// The black box and what it writes: docs/RECORDING.md.
 struct RecordConfig {
   bool on = false;
@@ -155,6 +170,7 @@ struct RecordConfig {
   bool on_deadline = true;  ///< triggers
   bool on_zone = false;
   bool on_signal = true;
+  bool on_input = true;
 };
 
 /// Everything the user can say, with its defaults. Plain values: read it anywhere, once loaded it does
@@ -172,6 +188,7 @@ struct Configuration {
   TelemetryConfig telemetry;
   std::vector<ZoneConfig> zones;
   std::vector<SignalConfig> signals;
+  std::vector<InputConfig> inputs;
   RecordConfig record;
   PipelineConfig pipeline;  ///< the stages' own Configs, see pipeline/pipeline_config.hpp
 };

@@ -124,6 +124,7 @@ std::vector<Key> keys_of(Configuration& c) {
 
       zones_key(c.zones),
       signals_key(c.signals),
+      inputs_key(c.inputs),
 
       key("record.on", c.record.on,
           "Keeps the last seconds in memory and writes them to a recording when something happens."),
@@ -142,6 +143,7 @@ std::vector<Key> keys_of(Configuration& c) {
       key("record.on_deadline", c.record.on_deadline, "Records when a result was not there in time."),
       key("record.on_zone", c.record.on_zone, "Records when a target comes into a zone."),
       key("record.on_signal", c.record.on_signal, "Records when the service is sent SIGUSR1."),
+      key("record.on_input", c.record.on_input, "Records when an [[input]] line has an edge."),
 
       key("equalise.mode", p.equalise,
           {{"off", EqualiseMode::kOff}, {"frame", EqualiseMode::kFrame}, {"frozen", EqualiseMode::kFrozen}},

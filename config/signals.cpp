@@ -80,6 +80,30 @@ std::vector<Key> keys_of_signal(SignalConfig& signal) {
   };
 }
 
+std::vector<Key> keys_of_input(InputConfig& input) {
+  return {
+      required(key("name", input.name, check_name, "What logs and metrics call it.")),
+      required(
+          key("line", input.line, check_line,
+              "CHIP:LINE, as a signal's. Where LINE of chip sim is a path, it is a FIFO: echo 1 > PATH drives it.")),
+      key("edge", input.edge,
+          {{"rising", InputEdge::kRising}, {"falling", InputEdge::kFalling}, {"both", InputEdge::kBoth}},
+          "Which edges count: becoming active, inactive, or both."),
+      key("active", input.active, {{"high", ActiveLevel::kHigh}, {"low", ActiveLevel::kLow}},
+          "Level of the line when it is active."),
+      key("bias", input.bias,
+          {{"as_is", InputBias::kAsIs},
+           {"none", InputBias::kNone},
+           {"pull_up", InputBias::kPullUp},
+           {"pull_down", InputBias::kPullDown}},
+          "What the chip holds the line's level with where nothing drives it; not every chip can."),
+      key("debounce_ms", input.debounce_ms, 0, 1000, "ms",
+          "A level counts once it was still for so long. Needs a build with libgpiod 2.x."),
+      key("apart_ms", input.apart_ms, 0, 3600000, "ms",
+          "Edges that come sooner after one that triggered trigger nothing."),
+  };
+}
+
 /// What is wrong with a table, and which of its keys says so.
 struct Wrong {
   std::string_view key;
@@ -180,6 +204,16 @@ Key signals_key(std::vector<SignalConfig>& signals) {
                 "A GPIO line that tells something about targets or about the rig itself; docs/SIGNALS.md.");
 }
 
+Key inputs_key(std::vector<InputConfig>& inputs) {
+  InputConfig door;
+  door.name = "door";
+  door.line = "gpiochip0:5";
+  door.active = ActiveLevel::kLow;
+  door.bias = InputBias::kPullUp;
+  return tables("input", inputs, kMaxInputs, keys_of_input, door,
+                "A GPIO line whose edges are a reason to record; docs/RECORDING.md.");
+}
+
 void check_signals(const Loaded& loaded) {
   const Configuration& c = loaded.configuration;
   for (std::size_t i = 0; i < c.zones.size(); ++i) refuse_if(loaded, table_name("zone", i), wrong_of(c.zones[i]));
@@ -189,6 +223,17 @@ void check_signals(const Loaded& loaded) {
   check_unique(loaded, "zone", c.zones, &ZoneConfig::name, "name", "give each zone its own name");
   check_unique(loaded, "signal", c.signals, &SignalConfig::name, "name", "give each signal its own name");
   check_unique(loaded, "signal", c.signals, &SignalConfig::line, "line", "a line has one rule");
+  check_unique(loaded, "input", c.inputs, &InputConfig::name, "name", "give each input its own name");
+  check_unique(loaded, "input", c.inputs, &InputConfig::line, "line", "give each input its own line");
+  for (std::size_t i = 0; i < c.inputs.size(); ++i) {
+    for (std::size_t k = 0; k < c.signals.size(); ++k) {
+      if (c.inputs[i].line != c.signals[k].line) continue;
+      const std::string driven = table_name("signal", k);
+      refuse_if(loaded, table_name("input", i),
+                {"line", quoted(c.inputs[i].line) + " is driven by " + driven + " (" +
+                             loaded.origins.find(driven + ".line")->second + "): a line is read or driven"});
+    }
+  }
 }
 
 }  // namespace stereotrack::config

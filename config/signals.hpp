@@ -12,15 +12,17 @@ namespace stereotrack::config {
 
 inline constexpr std::size_t kMaxZones = 16;
 inline constexpr std::size_t kMaxSignals = 16;
+inline constexpr std::size_t kMaxInputs = 16;
 inline constexpr std::size_t kMaxCorners = 16;  ///< of a zone in the picture
 
-/// [[zone]] and [[signal]], for the table in schema.cpp.
+/// [[zone]], [[signal]] and [[input]], for the table in schema.cpp.
 [[nodiscard]] Key zones_key(std::vector<ZoneConfig>& zones);
 [[nodiscard]] Key signals_key(std::vector<SignalConfig>& signals);
+[[nodiscard]] Key inputs_key(std::vector<InputConfig>& inputs);
 
-/// Throws Error for the first zone or signal that contradicts itself or another, at the key that says so: names and
-/// lines given twice, a zone that is neither in space nor in the picture, a zone that there is not, a condition without
-/// its limit, a pulse without width. Part of load().
+/// Throws Error for the first zone, signal or input that contradicts itself or another, at the key that says so: names
+/// and lines given twice, a line that is both driven and read, a zone that is neither in space nor in the picture, a
+/// zone that there is not, a condition without its limit, a pulse without width. Part of load().
 void check_signals(const Loaded& loaded);
 
 }  // namespace stereotrack::config

@@ -88,16 +88,16 @@ std::vector<LineFacts> lines_of(const Chip& chip) {
   return lines;
 }
 
-/// Why a request was refused, as far as the chip can tell.
-std::string request_refusal(const std::string& path, const WantedLine& wanted, int error) {
+/// Why a request was refused, as far as the chip can tell; `unfit`: why the kernel may find that it cannot be so.
+std::string request_refusal(const std::string& path, unsigned offset, int error, const std::string& unfit) {
   if (error == EACCES || error == EPERM) return no_permission(path);
   if (error == EBUSY) {
     const auto chip = Chip::open(path);
-    const std::string consumer = chip ? chip->line(wanted.offset).consumer : std::string();
+    const std::string consumer = chip ? chip->line(offset).consumer : std::string();
     return "busy: held by " + (consumer.empty() ? "another program or a driver" : "\"" + consumer + "\"") +
            ": stop that, or take another line (gpioinfo lists them)";
   }
-  if (error == EINVAL || error == EIO) return "the kernel does not make it an output: is it an input by design?";
+  if (error == EINVAL || error == EIO || error == ENXIO || error == ENOTSUP) return unfit;
   return "cannot be requested: " + std::generic_category().message(error);
 }
 
@@ -127,15 +127,36 @@ std::unique_ptr<LineRequest> request(const std::string& path, std::span<const Wa
   if (!chip) refuse(lines.front().name, open_refusal(path, errno));
   if (auto made = Chip::request(std::move(chip), lines, user)) return made;
   const int error = errno;
+  const std::string unfit = "the kernel does not make it an output: is it an input by design?";
   // Which of the lines it was: the one that is refused by itself, too. The others show their safe states meanwhile, as
   // they would have with the request.
   for (const WantedLine& line : lines) {
     auto again = Chip::open(path);
     if (again && !Chip::request(std::move(again), {&line, 1}, user)) {
-      refuse(line.name, request_refusal(path, line, errno));
+      refuse(line.name, request_refusal(path, line.offset, errno, unfit));
     }
   }
-  refuse(lines.front().name, request_refusal(path, lines.front(), error));
+  refuse(lines.front().name, request_refusal(path, lines.front().offset, error, unfit));
+}
+
+std::unique_ptr<InputRequest> request_inputs(const std::string& path, std::span<const WantedInput> lines,
+                                             std::string_view consumer) {
+  const std::string user(consumer);
+  auto chip = Chip::open(path);
+  if (!chip) refuse(lines.front().spec.name, open_refusal(path, errno));
+  if (auto made = Chip::request_inputs(std::move(chip), lines, user)) return made;
+  const int error = errno;
+  const std::string unfit =
+      "the kernel does not tell its edges: has the chip interrupts, and a bias of this kind? Leave the bias out, or "
+      "take "
+      "another line";
+  for (const WantedInput& line : lines) {
+    auto again = Chip::open(path);
+    if (again && !Chip::request_inputs(std::move(again), {&line, 1}, user)) {
+      refuse(line.spec.name, request_refusal(path, line.offset, errno, unfit));
+    }
+  }
+  refuse(lines.front().spec.name, request_refusal(path, lines.front().offset, error, unfit));
 }
 
 }  // namespace stereotrack::gpio::gpiod

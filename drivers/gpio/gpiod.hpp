@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "drivers/gpio/input_lines.hpp"
 #include "drivers/gpio/line.hpp"
 
 namespace stereotrack::gpio::gpiod {
@@ -23,6 +24,10 @@ struct Found {
 /// output.
 [[nodiscard]] std::unique_ptr<LineRequest> request(const std::string& path, std::span<const WantedLine> lines,
                                                    std::string_view consumer);
+
+/// The same for inputs with their edges.
+[[nodiscard]] std::unique_ptr<InputRequest> request_inputs(const std::string& path, std::span<const WantedInput> lines,
+                                                           std::string_view consumer);
 
 /// The interface of libgpiod that this build speaks: "1", "2", "none".
 [[nodiscard]] std::string_view interface() noexcept;

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "drivers/gpio/choice.hpp"
+#include "drivers/gpio/input_lines.hpp"
 #include "drivers/gpio/line.hpp"
 
 struct gpiod_chip;
@@ -29,6 +30,11 @@ class Chip {
   [[nodiscard]] static std::unique_ptr<LineRequest> request(std::unique_ptr<Chip> chip,
                                                             std::span<const WantedLine> lines,
                                                             const std::string& consumer);
+
+  /// The same for inputs, each with its edges.
+  [[nodiscard]] static std::unique_ptr<InputRequest> request_inputs(std::unique_ptr<Chip> chip,
+                                                                    std::span<const WantedInput> lines,
+                                                                    const std::string& consumer);
 
  private:
   Chip(gpiod_chip* handle, const std::string& path) : handle_(handle), path_(path) {}

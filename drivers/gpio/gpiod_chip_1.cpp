@@ -1,6 +1,8 @@
 // libgpiod 1.x: Debian 12.
 #include <gpiod.h>
+#include <poll.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 
@@ -26,6 +28,82 @@ class Request final : public LineRequest {
  private:
   std::unique_ptr<Chip> chip_;
   gpiod_line_bulk lines_;
+};
+
+/// What the library calls the edges.
+int request_type(Edges edges) noexcept {
+  switch (edges) {
+    case Edges::kRising: return GPIOD_LINE_REQUEST_EVENT_RISING_EDGE;
+    case Edges::kFalling: return GPIOD_LINE_REQUEST_EVENT_FALLING_EDGE;
+    case Edges::kBoth: break;
+  }
+  return GPIOD_LINE_REQUEST_EVENT_BOTH_EDGES;
+}
+
+int request_flags(const InputSpec& spec) noexcept {
+  int flags = spec.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+  switch (spec.bias) {
+    case Bias::kAsIs: break;
+    case Bias::kNone: flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_DISABLE; break;
+    case Bias::kPullUp: flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP; break;
+    case Bias::kPullDown: flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN; break;
+  }
+  return flags;
+}
+
+/// A descriptor a line: so the kernel's first interface has it.
+class Inputs final : public InputRequest {
+ public:
+  explicit Inputs(std::unique_ptr<Chip> chip) : chip_(std::move(chip)) {}
+
+  /// Of a line that was requested.
+  void add(gpiod_line* line) noexcept {
+    lines_[count_] = line;
+    descriptors_[count_++] = gpiod_line_event_get_fd(line);
+  }
+
+  [[nodiscard]] std::span<const int> descriptors() const noexcept override {
+    return std::span(descriptors_).first(count_);
+  }
+
+  [[nodiscard]] ReadResult read(std::span<EdgeEvent> events) noexcept override {
+    ReadResult result;
+    std::array<pollfd, kMaxLines> waited{};
+    for (std::size_t i = 0; i < count_; ++i) waited[i] = {descriptors_[i], POLLIN, 0};
+    // Readings of a line without an edge wait for one.
+    if (::poll(waited.data(), count_, 0) <= 0) return result;
+    for (std::size_t i = 0; i < count_ && result.events < events.size(); ++i) {
+      if (waited[i].revents == 0) continue;
+      const std::size_t room = std::min(came_.size(), events.size() - result.events);
+      const int count = gpiod_line_event_read_multiple(lines_[i], came_.data(), static_cast<unsigned>(room));
+      if (count < 0) {
+        result.error = errno == 0 ? EIO : errno;
+        return result;
+      }
+      for (int k = 0; k < count; ++k) {
+        const gpiod_line_event& event = came_[static_cast<std::size_t>(k)];
+        events[result.events++] = {
+            .line = i,
+            .edge = event.event_type == GPIOD_LINE_EVENT_RISING_EDGE ? Edge::kRising : Edge::kFalling,
+            .time = MonotonicTime(std::chrono::seconds(event.ts.tv_sec) + std::chrono::nanoseconds(event.ts.tv_nsec))};
+      }
+    }
+    return result;
+  }
+
+  [[nodiscard]] int probe() noexcept override {
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (gpiod_line_get_value(lines_[i]) < 0) return errno == 0 ? EIO : errno;
+    }
+    return 0;
+  }
+
+ private:
+  std::unique_ptr<Chip> chip_;
+  std::array<gpiod_line*, kMaxLines> lines_{};
+  std::array<int, kMaxLines> descriptors_{};
+  std::size_t count_ = 0;
+  std::array<gpiod_line_event, 16> came_{};  ///< as many as the kernel keeps
 };
 
 }  // namespace
@@ -64,6 +142,21 @@ std::unique_ptr<LineRequest> Chip::request(std::unique_ptr<Chip> chip, std::span
   }
   if (gpiod_line_request_bulk_output(&bulk, consumer.c_str(), levels.data()) != 0) return nullptr;
   return std::make_unique<Request>(std::move(chip), bulk);
+}
+
+std::unique_ptr<InputRequest> Chip::request_inputs(std::unique_ptr<Chip> chip, std::span<const WantedInput> lines,
+                                                   const std::string& consumer) {
+  gpiod_chip* const handle = chip->handle_;
+  auto made = std::make_unique<Inputs>(std::move(chip));
+  for (const WantedInput& wanted : lines) {
+    gpiod_line* const line = gpiod_chip_get_line(handle, wanted.offset);
+    if (line == nullptr) return nullptr;
+    const gpiod_line_request_config config{consumer.c_str(), request_type(wanted.spec.edges),
+                                           request_flags(wanted.spec)};
+    if (gpiod_line_request(line, &config, 0) != 0) return nullptr;
+    made->add(line);
+  }
+  return made;
 }
 
 std::string_view interface() noexcept { return "1"; }

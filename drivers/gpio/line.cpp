@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <stdexcept>
 #include <utility>
 
 #include "drivers/gpio/gpiod.hpp"
+#include "drivers/gpio/locate.hpp"
 #include "drivers/gpio/simulated_chip.hpp"
 
 namespace stereotrack::gpio {
@@ -20,46 +22,83 @@ struct Meter {
   std::atomic<std::uint64_t> failures{0};
 };
 
-/// A chip's lines among all of the program.
+/// A chip's lines among all of the program. Requests are handed over by pointers: what is `incoming` becomes `current`
+/// in set(), what was becomes `retired`, and reopen() frees it. Only set(), reopen() and the handler of a fault look.
 struct ChipLines {
-  std::string path;                       ///< of the chip, or "sim"
-  std::vector<WantedLine> wanted;         ///< until it is requested
+  ChipLines() = default;
+  ChipLines(const ChipLines&) = delete;
+  ChipLines& operator=(const ChipLines&) = delete;
+  ~ChipLines() {
+    for (auto* place : {&current, &incoming, &retired}) delete place->load();
+  }
+
+  std::string path;                       ///< of the chip when it was found first, or "sim"
+  std::vector<WantedLine> wanted;         ///< as it was requested first: with the safe levels
   std::array<unsigned, kMaxLines> all{};  ///< line k of this chip is line all[k] of the program
   std::size_t count = 0;
   LineBits mine = 0;  ///< the same, as bits
-  std::unique_ptr<LineRequest> request;
-  bool failed = false;  ///< refused last time: what its lines show is not known
+  std::atomic<LineRequest*> current{nullptr};
+  std::atomic<LineRequest*> incoming{nullptr};
+  std::atomic<LineRequest*> retired{nullptr};
+  bool failed = false;  ///< refused last time: what its lines show is not known; set()'s
 };
 
 [[noreturn]] void refuse(const LineName& name, const std::string& what) {
   throw std::runtime_error("GPIO line " + to_string(name) + ": " + what);
 }
 
+std::unique_ptr<LineRequest> request(const std::string& path, std::span<const WantedLine> lines,
+                                     std::string_view consumer) {
+  return path == simulated_chip::kChip ? simulated_chip::request(lines, consumer)
+                                       : gpiod::request(path, lines, consumer);
+}
+
 }  // namespace
 
 struct OutputLines::State {
-  std::vector<ChipLines> chips;
+  std::vector<std::unique_ptr<ChipLines>> chips;
   std::vector<LineName> names;
+  std::string consumer;
   LineBits low = 0;   ///< lines that are active_low
   LineBits safe = 0;  ///< lines whose safe state is active
   LineBits told = 0;  ///< active lines, as far as their chips took it
   std::array<Meter, kMaxLines> meters;
   std::atomic<int> last_error{0};
+  std::atomic<LineBits> failing{0};
+  std::atomic<LineBits> gone{0};
+  std::atomic<std::uint64_t> outages{0};
   std::atomic<bool> held{false};  ///< safe for ever
 
+  // Sequentially consistent, here and in reopen(): either it sees that they are held and frees nothing, or this sees
+  // the request that is in use since.
   bool hold() noexcept {
     held.store(true);
     bool all = true;
-    for (ChipLines& chip : chips) all = chip.request->set(levels(chip, safe)) == 0 && all;
+    for (const auto& chip : chips) all = chip->current.load()->set(levels(*chip, safe)) == 0 && all;
     return all;
   }
 
-  SetResult set(LineBits active, MonotonicTime now) noexcept {
+  /// A chip that is back, if it is.
+  void take_over(ChipLines& chip) noexcept {
+    // Not before the last one was fetched: there is one place for what is retired.
+    if (chip.incoming.load(std::memory_order_relaxed) == nullptr || chip.retired.load() != nullptr) return;
+    LineRequest* const next = chip.incoming.exchange(nullptr);
+    if (next != nullptr) chip.retired.store(chip.current.exchange(next));
+  }
+
+  SetResult set(LineBits active, MonotonicTime now, bool all = false) noexcept {
     SetResult result;
-    for (ChipLines& chip : chips) {
+    for (const auto& each : chips) {
+      ChipLines& chip = *each;
       const LineBits differ = (active ^ told) & chip.mine;
-      if ((differ == 0 && !chip.failed) || held.load()) continue;
-      const int error = chip.request->set(levels(chip, active));
+      if ((differ == 0 && !chip.failed && !all) || held.load()) continue;
+      if (chip.failed) take_over(chip);
+      const int error = chip.current.load(std::memory_order_relaxed)->set(levels(chip, active));
+      if (error == ENODEV && (gone.load(std::memory_order_relaxed) & chip.mine) == 0) {
+        outages.fetch_add(1, std::memory_order_relaxed);
+      }
+      mark(failing, chip.mine, error != 0);
+      mark(gone, chip.mine, error == ENODEV);
       chip.failed = error != 0;
       if (chip.failed) {
         last_error.store(error, std::memory_order_relaxed);
@@ -71,6 +110,11 @@ struct OutputLines::State {
     }
     for (unsigned i = 0; i < names.size(); ++i) note(i, result, now);
     return result;
+  }
+
+  static void mark(std::atomic<LineBits>& bits, LineBits mine, bool on) noexcept {
+    const LineBits before = bits.load(std::memory_order_relaxed);
+    bits.store(on ? before | mine : before & ~mine, std::memory_order_relaxed);
   }
 
   /// Line k of the chip is bit k.
@@ -103,6 +147,8 @@ OutputLines::~OutputLines() {
   if (state_ != nullptr) state_->set(state_->safe, {});
 }
 
+OutputLines::SetResult OutputLines::refresh(MonotonicTime now) noexcept { return state_->set(state_->told, now, true); }
+
 OutputLines::SetResult OutputLines::set(LineBits active, MonotonicTime now) noexcept {
   return state_->set(active, now);
 }
@@ -123,6 +169,12 @@ OutputLines::Reading OutputLines::read(std::size_t line) const noexcept {
           .failures = meter.failures.load(std::memory_order_relaxed)};
 }
 
+LineBits OutputLines::failing() const noexcept { return state_->failing.load(std::memory_order_relaxed); }
+
+LineBits OutputLines::gone() const noexcept { return state_->gone.load(std::memory_order_relaxed); }
+
+std::uint64_t OutputLines::outages() const noexcept { return state_->outages.load(std::memory_order_relaxed); }
+
 int OutputLines::last_error() const noexcept { return state_->last_error.load(std::memory_order_relaxed); }
 
 OutputLines open_lines(std::span<const LineSpec> specs, std::string_view consumer) {
@@ -132,17 +184,17 @@ OutputLines open_lines(std::span<const LineSpec> specs, std::string_view consume
   OutputLines lines;
   OutputLines::State& state = *lines.state_;
   for (const LineSpec& spec : specs) {
-    const bool simulated = spec.name.chip == simulated_chip::kChip;
-    const gpiod::Found found = simulated ? gpiod::Found{spec.name.chip, 0} : gpiod::find(spec.name);
-    auto chip = std::find_if(state.chips.begin(), state.chips.end(),
-                             [&](const ChipLines& known) { return known.path == found.path; });
-    if (chip == state.chips.end()) {
-      chip = state.chips.emplace(state.chips.end());
-      chip->path = found.path;
+    const gpiod::Found found = locate(spec.name);
+    auto place = std::find_if(state.chips.begin(), state.chips.end(),
+                              [&](const auto& known) { return known->path == found.path; });
+    if (place == state.chips.end()) {
+      place = state.chips.insert(state.chips.end(), std::make_unique<ChipLines>());
+      (*place)->path = found.path;
     }
+    ChipLines& chip = **place;
     const WantedLine wanted{spec.name, found.offset, spec.safe != spec.active_low};
-    for (const WantedLine& other : chip->wanted) {
-      if (simulated ? other.name == wanted.name : other.offset == wanted.offset) {
+    for (const WantedLine& other : chip.wanted) {
+      if (is_simulated(spec.name) ? other.name == wanted.name : other.offset == wanted.offset) {
         refuse(spec.name,
                "named twice" +
                    (other.name == spec.name ? std::string() : ", the other time as " + to_string(other.name)) +
@@ -151,19 +203,44 @@ OutputLines open_lines(std::span<const LineSpec> specs, std::string_view consume
     }
     const auto number = static_cast<unsigned>(state.names.size());
     state.names.push_back(spec.name);
-    chip->wanted.push_back(wanted);
-    chip->all[chip->count++] = number;
-    chip->mine |= LineBits{1} << number;
+    chip.wanted.push_back(wanted);
+    chip.all[chip.count++] = number;
+    chip.mine |= LineBits{1} << number;
     if (spec.active_low) state.low |= LineBits{1} << number;
     if (spec.safe) state.safe |= LineBits{1} << number;
     state.meters[number].active.store(spec.safe, std::memory_order_relaxed);
   }
   state.told = state.safe;
-  for (ChipLines& chip : state.chips) {
-    chip.request = chip.path == simulated_chip::kChip ? simulated_chip::request(chip.wanted, consumer)
-                                                      : gpiod::request(chip.path, chip.wanted, consumer);
-  }
+  state.consumer = consumer;
+  for (const auto& chip : state.chips) chip->current.store(request(chip->path, chip->wanted, consumer).release());
   return lines;
+}
+
+LineBits OutputLines::reopen(std::string* why) {
+  LineBits back = 0;
+  for (const auto& chip : state_->chips) {
+    LineRequest* const retired = chip->retired.exchange(nullptr);
+    // Held: the handler of a fault may be at it, and the process ends.
+    if (!state_->held.load()) delete retired;
+    if ((gone() & chip->mine) == 0 || chip->incoming.load() != nullptr) continue;
+    try {
+      // It may have come back under another path.
+      std::vector<WantedLine> wanted = chip->wanted;
+      std::string path;
+      for (WantedLine& line : wanted) {
+        const gpiod::Found found = locate(line.name);
+        if (!path.empty() && found.path != path)
+          refuse(line.name, "it is on " + found.path + " now, others of its chip on " + path);
+        path = found.path;
+        line.offset = found.offset;
+      }
+      chip->incoming.store(request(path, wanted, state_->consumer).release());
+      back |= chip->mine;
+    } catch (const std::runtime_error& error) {
+      if (why != nullptr) *why = error.what();
+    }
+  }
+  return back;
 }
 
 std::vector<SafeOutcome> set_lines_safe(std::span<const LineSpec> specs, std::string_view consumer) {

@@ -64,7 +64,12 @@ struct WantedLine {
 };
 
 /// All outputs of the program, whatever their chips. Made by open_lines(); moves, but not while it is used.
-/// One thread drives; metrics of any thread read.
+/// One thread drives, one looks after chips that went (reopen()); metrics of any thread read.
+///
+/// **A chip that goes** (a USB cable is pulled) refuses with ENODEV for good: its lines are gone(). reopen() asks for
+/// it anew, by the name that the user gave, as open_lines() did: with the safe states. The thread that drives takes the
+/// new request over in its next set(), by exchanging a pointer, and drives what it was told; what it gives up is freed
+/// by the next reopen(). A chip that refuses for another reason keeps its request and is tried again by each set().
 class OutputLines {
  public:
   struct SetResult {
@@ -88,15 +93,25 @@ class OutputLines {
   /// order in which their first lines were asked for. No heap, no lock. `now` stands in Reading::changed and nowhere
   /// else: whoever wants to know how long setting takes reads the clock before and after.
   SetResult set(LineBits active, MonotonicTime now) noexcept;
+  /// Drives all chips as they were told last: who is gone shows, though nothing changes.
+  SetResult refresh(MonotonicTime now) noexcept;
   /// All lines to their safe states.
   SetResult set_safe(MonotonicTime now) noexcept;
   /// The same for ever, whatever set() asks for from now on, and whatever the lines are believed to show. For the
   /// handler of a fault, while another thread may be amid set(). False: a chip refused.
   [[nodiscard]] bool hold_safe() noexcept;
 
+  /// Asks for chips that are gone, and frees what set() gave up. Lines that are there again, which the next set()
+  /// drives; `why`, unless it is null, is told of the last chip that is not: one line. One thread, not the one that
+  /// drives. Takes as long as open_lines(); throws nothing but std::bad_alloc.
+  LineBits reopen(std::string* why = nullptr);
+
   [[nodiscard]] std::size_t size() const noexcept;
   [[nodiscard]] const LineName& name(std::size_t line) const noexcept;
   [[nodiscard]] Reading read(std::size_t line) const noexcept;  ///< any thread
+  [[nodiscard]] LineBits failing() const noexcept;              ///< lines whose chip refused the last time. Any thread
+  [[nodiscard]] LineBits gone() const noexcept;                 ///< of these, those that need reopen(). Any thread
+  [[nodiscard]] std::uint64_t outages() const noexcept;         ///< times that a chip went. Any thread
   [[nodiscard]] int last_error() const noexcept;                ///< errno of the last refusal; 0: none. Any thread
 
  private:

@@ -20,6 +20,11 @@ std::unique_ptr<LineRequest> request(const std::string& /*path*/, std::span<cons
   refuse(lines.empty() ? LineName{} : lines.front().name);
 }
 
+std::unique_ptr<InputRequest> request_inputs(const std::string& /*path*/, std::span<const WantedInput> lines,
+                                             std::string_view /*consumer*/) {
+  refuse(lines.empty() ? LineName{} : lines.front().spec.name);
+}
+
 std::string_view interface() noexcept { return "none"; }
 
 }  // namespace stereotrack::gpio::gpiod

@@ -125,6 +125,7 @@ BlackBox::BlackBox(Config config, Run run, const Pipeline& pipeline)
   }
   arena_.seal();
   notes_.resize(kNotes);
+  counters_.slots_free_low.store(slots_);
 }
 
 // ---- frame loop
@@ -272,6 +273,11 @@ void BlackBox::freeze() noexcept {
   released_.store(frozen.first, std::memory_order_relaxed);
   if (!frozen_queue_.push(frozen)) return;
   frozen_ = true;
+  // From here on they are given back: there are never fewer.
+  const std::uint64_t free = slots_ - (frozen.last - frozen.first);
+  if (free < counters_.slots_free_low.load(std::memory_order_relaxed)) {
+    counters_.slots_free_low.store(free, std::memory_order_relaxed);
+  }
 }
 
 bool BlackBox::keyframe_step(const Pipeline& pipeline) noexcept {

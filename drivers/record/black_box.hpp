@@ -88,6 +88,7 @@ class BlackBox {
     std::atomic<std::uint64_t> triggers_dropped{0};    ///< that came while a recording was written
     std::atomic<std::uint64_t> recordings{0};          ///< written
     std::atomic<std::uint64_t> recordings_failed{0};   ///< disk full, or it could not be written
+    std::atomic<std::uint64_t> slots_free_low{0};      ///< fewest slots that no recording held; see slots()
     std::atomic<std::uint64_t> outputs_dropped{0};     ///< the service thread did not come to take them
   };
 
@@ -125,6 +126,9 @@ class BlackBox {
   [[nodiscard]] const std::string& last_recording() const noexcept { return last_recording_; }
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 
+  /// Frames that there is memory for. Those of a recording that is being written are the service thread's until it
+  /// gives them back, one by one; the others are free for frames to come.
+  [[nodiscard]] std::uint64_t slots() const noexcept { return slots_; }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return arena_.bytes_used(); }
   [[nodiscard]] bool is_exact() const noexcept { return config_.reduce == 1 && config_.every == 1; }
 

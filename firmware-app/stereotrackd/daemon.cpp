@@ -1,6 +1,8 @@
 #include "firmware-app/stereotrackd/daemon.hpp"
 
+#include <bit>
 #include <chrono>
+#include <cstring>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -83,6 +85,7 @@ Daemon::Daemon(Parts parts)
     : vitals_(std::make_unique<Vitals>()),
       source_(std::move(parts.source)),
       lines_(std::move(parts.lines)),
+      inputs_(std::move(parts.inputs)),
       signer_(std::move(parts.signer)),
       pool_(parts.pool_slots),
       outlet_(pool_, notices_, bell_),
@@ -192,6 +195,21 @@ void Daemon::record() {
     }
     std::this_thread::sleep_for(kRecorderRound);
   }
+}
+
+void Daemon::tend(MonotonicTime now) {
+  inputs_.take(box_.get());
+  inputs_.tend(now);
+  vitals_->inputs_gone.set(static_cast<std::uint64_t>(std::popcount(inputs_.gone())));
+  const gpio::LineBits failing = lines_.failing();
+  outputs_care_.tell(
+      failing, [this](std::size_t i) { return to_string(lines_.name(i)); }, std::strerror(lines_.last_error()), now);
+  const gpio::LineBits gone = lines_.gone();
+  // Where nothing is gone it frees what was given up, and does nothing else.
+  if (!outputs_care_.is_due(gone, now) && gone != 0) return;
+  std::string why;
+  (void)lines_.reopen(&why);
+  if (!why.empty()) outputs_care_.cannot(why);
 }
 
 bool Daemon::make_lines_safe() noexcept { return lines_.hold_safe(); }

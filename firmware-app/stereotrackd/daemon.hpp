@@ -14,6 +14,8 @@
 #include "firmware-app/runtime/real_time.hpp"
 #include "firmware-app/stereotrackd/capture_rt.hpp"
 #include "firmware-app/stereotrackd/frames_rt.hpp"
+#include "firmware-app/stereotrackd/inputs.hpp"
+#include "firmware-app/stereotrackd/line_care.hpp"
 #include "firmware-app/stereotrackd/publisher_rt.hpp"
 #include "firmware-app/stereotrackd/vitals.hpp"
 #include "pipeline/core/arena.hpp"
@@ -37,6 +39,7 @@ class Daemon {
     std::unique_ptr<capture::LiveSource> source;
     std::unique_ptr<Plan> plan;
     gpio::OutputLines lines;
+    Inputs inputs;
     std::uint64_t session = 0;
     std::unique_ptr<telemetry::Signer> signer;  ///< null: nothing is signed
     StageObserver also;                         ///< told of each stage's end, in the frame loop
@@ -72,6 +75,12 @@ class Daemon {
   [[nodiscard]] bool make_lines_safe() noexcept;
   [[nodiscard]] const LastStates& last_states() const noexcept { return publisher_->last_states(); }
 
+  /// Takes edges of inputs, asks for chips that went and tells the log: again and again, at least every 0.1 s and when
+  /// inputs().descriptor() is readable. May wait for a chip.
+  void tend(MonotonicTime now);
+  [[nodiscard]] Inputs& inputs() noexcept { return inputs_; }
+  [[nodiscard]] const Inputs& inputs() const noexcept { return inputs_; }
+
   /// The black box; null: record.on is false.
   [[nodiscard]] record::BlackBox* black_box() noexcept { return box_.get(); }
   [[nodiscard]] const record::BlackBox* black_box() const noexcept { return box_.get(); }
@@ -92,6 +101,8 @@ class Daemon {
   std::unique_ptr<Vitals> vitals_;
   std::unique_ptr<capture::LiveSource> source_;
   gpio::OutputLines lines_;
+  Inputs inputs_;
+  LineCare outputs_care_{"GPIO outputs"};
   std::unique_ptr<telemetry::Signer> signer_;
   capture::FramePool pool_;
   capture::PairOutlet::Notices notices_;

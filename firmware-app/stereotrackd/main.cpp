@@ -163,6 +163,7 @@ int run(const Arguments& arguments) {
     parts.signer =
         std::make_unique<telemetry::Signer>(telemetry::load_key_file(configuration.telemetry.key_file).front());
   }
+  const daemon::Inputs::Setup inputs = daemon::input_setup(configuration);
   parts.configuration = &configuration;
   parts.source = open_source(rig);
   parts.calibration = rig.calibration ? &*rig.calibration : nullptr;
@@ -194,6 +195,7 @@ int run(const Arguments& arguments) {
   if (configuration.record.on) fs::create_directories(configuration.record.directory);
   parts.session = telemetry::next_session(state);
   parts.lines = gpio::open_lines(signals::line_specs(configuration), "stereotrackd");
+  parts.inputs = daemon::Inputs(inputs);
 
   const std::uint64_t session = parts.session;
   daemon::Daemon daemon(std::move(parts));

@@ -61,6 +61,24 @@ class Text {
   const char* name_ = "";
 };
 
+void inputs_text(const Inputs& inputs, Text& text) {
+  if (inputs.size() == 0) return;
+  const auto each = [&](const char* name, const char* type, const char* help, const auto& value_of) {
+    text.family(name, type, help);
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      const std::string label = "{input=\"" + inputs.name(i) + "\",line=\"" + gpio::to_string(inputs.line(i)) + "\"}";
+      text.value(label.c_str(), value_of(i));
+    }
+  };
+  each("input_there", "gauge", "0: the chip of the line is gone.",
+       [&](std::size_t i) { return std::uint64_t{inputs.is_gone(i) ? 0U : 1U}; });
+  each("input_edges_total", "counter", "Edges that came.", [&](std::size_t i) { return inputs.events(i); });
+  each("input_edges_lost_total", "counter", "Edges that came too fast to be read, as far as that shows.",
+       [&](std::size_t i) { return inputs.lost(i); });
+  each("input_triggers_total", "counter", "Edges for which the black box was to write.",
+       [&](std::size_t i) { return inputs.triggers(i); });
+}
+
 }  // namespace
 
 std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
@@ -128,6 +146,10 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
     }
   }
   text.counter("lines_failed_total", "Drives of lines that were refused.", vitals.lines_failed.get());
+  text.family("gpio_chips_lost_total", "counter", "Times that a GPIO chip went away.");
+  text.value("{lines=\"outputs\"}", daemon.lines().outages());
+  text.value("{lines=\"inputs\"}", daemon.inputs().outages());
+  inputs_text(daemon.inputs(), text);
 
   if (const record::BlackBox* box = daemon.black_box()) {
     const record::BlackBox::Counters& counters = box->counters();

@@ -44,6 +44,10 @@ config::Configuration accepted(const config::Configuration& running, const confi
     next.zones = wanted.zones;
     next.signals = wanted.signals;
   }
+  if (difference.inputs) {
+    next.inputs = wanted.inputs;
+    next.record.on_input = wanted.record.on_input;
+  }
   return next;
 }
 
@@ -55,14 +59,17 @@ Difference difference(const config::Configuration& running, const config::Config
   Difference difference;
   for (std::size_t i = 0; i < before_keys.size(); ++i) {
     const config::Key& key = before_keys[i];
-    if (key.kind == config::Kind::kTables) continue;  // zones and signals, below
+    if (key.kind == config::Kind::kTables) continue;  // zones, signals and inputs, below
     if (key.get() == after_keys[i].get()) continue;
     if (std::find(kDestinations.begin(), kDestinations.end(), key.name) != kDestinations.end()) {
       difference.destinations = true;
+    } else if (key.name == "record.on_input") {
+      difference.inputs = true;
     } else {
       difference.refused.push_back(key.name);
     }
   }
+  difference.inputs = difference.inputs || running.inputs != wanted.inputs;
   if (running.zones == wanted.zones && running.signals == wanted.signals) return difference;
   // A rule may change under a line; the lines themselves were requested at start.
   if (signals::line_specs(running) == signals::line_specs(wanted)) {

@@ -18,6 +18,7 @@ namespace stereotrack::daemon {
 struct Difference {
   bool destinations = false;
   bool rules = false;                ///< zones and signals; their lines are the same
+  bool inputs = false;               ///< all of them, and record.on_input
   std::vector<std::string> refused;  ///< keys that need a restart
   [[nodiscard]] bool plan() const noexcept { return destinations || rules; }
 };

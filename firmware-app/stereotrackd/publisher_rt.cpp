@@ -108,6 +108,7 @@ void Publisher::take_news() noexcept {
     // Read after it came: a pair that was put in a moment ago must not look as if it were to come.
     schedule_.notice(notice.ordinal, notice.capture_time, runtime::monotonic_now());
     skews_[notice.ordinal % skews_.size()] = notice;
+    if (notice.skew) skew_max_ = std::max(skew_max_, std::chrono::abs(*notice.skew));
   }
   if (const Outcome* outcome = mailbox_.take()) {
     const auto keep = schedule_.result(outcome->ordinal, outcome->capture_time, runtime::monotonic_now());
@@ -286,7 +287,7 @@ void Publisher::judge_health() noexcept {
   tell_if(schedule_.status_only(), telemetry::kHealthNoPairs);
   tell_if(misses != misses_seen_, telemetry::kHealthDeadlinesMissed);
   tell_if(vitals_.efforts_left_out.get() != 0, telemetry::kHealthEffortShed);
-  tell_if(lines_failed != lines_failed_seen_, telemetry::kHealthLineFailed);
+  tell_if(lines_failed != lines_failed_seen_ || vitals_.inputs_gone.get() != 0, telemetry::kHealthLineFailed);
   tell_if(drops != drops_seen_, telemetry::kHealthTelemetryDrops);
   tell_if(recordings != recordings_seen_, telemetry::kHealthRecordingDrops);
   recordings_seen_ = recordings;
@@ -330,7 +331,10 @@ void Publisher::send_status(MonotonicTime now) noexcept {
   if (box_ != nullptr) {
     const record::BlackBox::Counters& box = box_->counters();
     status.recordings_dropped = box.triggers_dropped.load() + box.recordings_failed.load();
+    status.recorder_slots = narrow(box_->slots());
+    status.recorder_slots_free_low = narrow(box.slots_free_low.load());
   }
+  status.skew_max_us = to_us(static_cast<std::uint64_t>(skew_max_.count()));
   status.pair_buffers = narrow(config_.pool_slots);
   status.pair_buffers_free_low = narrow(pool.free_low);
   status.pairs_waiting_high = narrow(pool.waiting_high);
@@ -370,6 +374,8 @@ void Publisher::between_slots(MonotonicTime now) noexcept {
   if (!has_room && now < next_status_ + kStatusPeriod) return;
   look_at_clocks(now);
   send_status(now);
+  // Here, where it delays no slot: a chip that is gone shows, though none of its lines changes.
+  if (lines_.refresh(now).failed != 0) vitals_.lines_failed.add();
   next_status_ = std::max(next_status_ + kStatusPeriod, now);
 }
 

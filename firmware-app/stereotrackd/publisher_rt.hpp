@@ -140,6 +140,7 @@ class Publisher {
   bool clock_stepped_ = false;  ///< to be told with the next message
   runtime::TaiReading tai_;
   std::optional<std::chrono::nanoseconds> send_error_;
+  std::chrono::nanoseconds skew_max_{0};  ///< |pair skew|, of pairs that have one
   std::uint32_t health_ = 0;
   std::uint64_t misses_seen_ = 0;  ///< at the last judgement
   std::uint64_t drops_seen_ = 0;

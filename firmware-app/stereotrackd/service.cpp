@@ -11,6 +11,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/stereotrackd/log.hpp"
 #include "firmware-app/stereotrackd/metrics.hpp"
 
@@ -114,10 +115,6 @@ void Service::log_changes(const Daemon& daemon) {
   if (const std::uint64_t by = changed(allocations_, vitals.allocations()); by > 0) {
     log(LogLevel::kError, std::to_string(by) + " heap calls in real-time threads", {{"STEREOTRACK_CAUSE", "heap"}});
   }
-  if (const std::uint64_t by = changed(lines_failed_, vitals.lines_failed.get()); by > 0) {
-    log(LogLevel::kError, "GPIO lines could not be driven: " + std::string(std::strerror(daemon.lines().last_error())),
-        {{"STEREOTRACK_CAUSE", "line"}});
-  }
   if (const std::uint64_t by = changed(telemetry_failed_, vitals.telemetry_failed.get()); by > 0) {
     log(LogLevel::kWarning, std::to_string(by) + " datagrams found no way in the last second",
         {{"STEREOTRACK_CAUSE", "telemetry"}});
@@ -173,12 +170,13 @@ void Service::run(Daemon& daemon) {
   Clock::time_point next = Clock::now();
   while (take_signals() && !daemon.is_over()) {
     feed_watchdog(daemon);
+    daemon.tend(runtime::monotonic_now());
     if (Clock::now() >= next) {
       every_second(daemon);
       next = std::max(next + std::chrono::seconds(1), Clock::now());
     }
-    pollfd ready{signals_, POLLIN, 0};
-    (void)poll(&ready, 1, static_cast<int>(kRound.count()));
+    std::array<pollfd, 2> ready{{{signals_, POLLIN, 0}, {daemon.inputs().descriptor(), POLLIN, 0}}};
+    (void)poll(ready.data(), ready.size(), static_cast<int>(kRound.count()));
   }
   (void)sd_notify(0, "STOPPING=1");
   const bool stopped = daemon.stop();

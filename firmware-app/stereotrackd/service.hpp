@@ -15,8 +15,9 @@
 
 namespace stereotrack::daemon {
 
-/// What the main thread does while the others run: reads signals, logs what the counters say, serves figures, tells
-/// systemd that the daemon is ready and alive. It may block, allocate and throw; nothing waits for it.
+/// What the main thread does while the others run: reads signals and edges of inputs, asks for GPIO chips that went,
+/// logs what the counters say, serves figures, tells systemd that the daemon is ready and alive. It may block, allocate
+/// and throw; nothing waits for it.
 ///
 /// The watchdog is fed only while all three threads go round: their beats must have risen since the last time.
 class Service {
@@ -57,7 +58,6 @@ class Service {
   std::array<std::uint64_t, kScheduleCounters.size()> schedule_{};
   std::uint64_t efforts_ = 0;
   std::uint64_t allocations_ = 0;
-  std::uint64_t lines_failed_ = 0;
   std::uint64_t telemetry_failed_ = 0;
   std::uint64_t frames_refused_ = 0;
   std::uint64_t recordings_ = 0;

@@ -82,6 +82,7 @@ struct Vitals {
 
   // ---- Service
   Counter reloads_refused;  ///< SIGHUPs whose file was wrong
+  Counter inputs_gone;      ///< now: lines of inputs whose chip is gone
 
   /// Of all real-time threads.
   [[nodiscard]] std::uint64_t allocations() const noexcept {

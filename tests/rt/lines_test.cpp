@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/gpio/input_lines.hpp"
 #include "drivers/gpio/line.hpp"
 #include "drivers/gpio/simulated_chip.hpp"
 #include "firmware-app/signals/signal_rules.hpp"
@@ -51,6 +52,9 @@ TEST(Lines, TenThousandOutputsMakeNoHeapCall) {
   std::uint64_t heap_calls = 0;
   for (int i = 0; i < 10'000; ++i) {
     if (i == 5000 || i == 5100) gpio::simulated_chip::set_gone("rt0", i == 5000);
+    if (i == 5100) {
+      EXPECT_EQ(lines.reopen(), 0b111111U);
+    }
     for (std::size_t k = 0; k < targets.size(); ++k) {
       targets[k].position = {0.1 * static_cast<double>(k), 0, 6 + 5 * ((i / 40) % 2 == 0 ? 1.0 : -1.0)};
       targets[k].velocity = {0, 0, -1};
@@ -76,6 +80,28 @@ TEST(Lines, TenThousandOutputsMakeNoHeapCall) {
   EXPECT_EQ(heap_calls, 0U);
   EXPECT_EQ(ever_changed, 0b111111U) << "all lines moved";
   EXPECT_EQ(ever_failed, 0b111111U) << "and their chip was gone for a while";
+  EXPECT_EQ(lines.gone(), 0U) << "and came back";
+}
+
+TEST(Lines, EdgesAreReadWithoutAHeapCall) {
+  const std::vector<gpio::InputSpec> specs{{.name = {"sim", "rt_in_a"}, .edges = gpio::Edges::kBoth},
+                                           {.name = {"sim", "rt_in_b"}, .edges = gpio::Edges::kBoth}};
+  gpio::InputLines lines = gpio::open_inputs(specs, "test");
+  std::array<gpio::EdgeEvent, 8> events;
+  std::size_t read = 0;
+  std::uint64_t heap_calls = 0;
+  for (int i = 0; i < 10'000; ++i) {
+    const MonotonicTime now{milliseconds(i)};
+    for (const char* line : {"rt_in_a", "rt_in_b"}) gpio::simulated_chip::drive(line, i % 2 == 0, now);
+    const test::HeapWatch watch;
+    if (i % 5 == 0) {
+      for (std::size_t count = lines.read(events); count > 0; count = lines.read(events)) read += count;
+    }
+    lines.probe();
+    heap_calls += watch.calls();
+  }
+  EXPECT_EQ(heap_calls, 0U);
+  EXPECT_GT(read, 19'000U);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "drivers/telemetry/receiver.hpp"
 #include "drivers/telemetry/udp_listener.hpp"
 #include "drivers/telemetry/udp_sender.hpp"
+#include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/stereotrackd/daemon.hpp"
 #include "tests/support/moving_scene.hpp"
 #include "tests/support/scene_film.hpp"
@@ -90,6 +91,7 @@ struct LiveRig {
     (void)daemon->start(off, false);
     while (!daemon->is_over() && !enough()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      daemon->tend(runtime::monotonic_now());
       ear.listen();
     }
     daemon->stop();

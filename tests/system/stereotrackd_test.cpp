@@ -106,17 +106,20 @@ TEST(Stereotrackd, BadConfigurationIsOneLineAndExitCodeTwo) {
   };
   const std::string synthetic =
       "[synthetic]\nframes = 2\nwidth = 64\nheight = 48\n[source]\nname = \"synthetic:eleven\"\n";
-  for (const Case& bad : {Case{"[source]\nfps = 30.0\n", "source.name: not set"},
-                          Case{"[source]\nname = \"synthetic:twelve\"\n", "twelve"},
-                          Case{"[source]\nname = \"/dev/video0\"\n", "source.name: \"/dev/video0\" is no source"},
-                          Case{synthetic + "[latency]\noutput = 50\n", "latency.output: unknown key"},
-                          Case{synthetic + "[metrics]\nlisten = \"garbage\"\n", "metrics.listen: "},
-                          Case{synthetic + "[latency]\nlead_ms = 20\n", "latency.lead_ms: "},
-                          Case{"[source]\nflip = true\nname = \"synthetic:eleven\"\n", "source.flip: "},
-                          Case{synthetic + "[telemetry]\ndestinations = [\"nowhere:1\"]\n", "nowhere"},
-                          Case{synthetic + "[telemetry]\nkey_file = "
-                                           "\"/no/such.key\"\n",
-                               "/no/such.key"}}) {
+  for (const Case& bad :
+       {Case{"[source]\nfps = 30.0\n", "source.name: not set"},
+        Case{"[source]\nname = \"synthetic:twelve\"\n", "twelve"},
+        Case{"[source]\nname = \"/dev/video0\"\n", "source.name: \"/dev/video0\" is no source"},
+        Case{synthetic + "[latency]\noutput = 50\n", "latency.output: unknown key"},
+        Case{synthetic + "[metrics]\nlisten = \"garbage\"\n", "metrics.listen: "},
+        Case{synthetic + "[latency]\nlead_ms = 20\n", "latency.lead_ms: "},
+        Case{synthetic + "[[input]]\nname = \"a\"\nline = \"gpiochip0\"\n", "input[1].line: "},
+        Case{synthetic + "[[input]]\nname = \"a\"\nline = \"sim:a\"\nedge = \"up\"\n", "input[1].edge: "},
+        Case{"[source]\nflip = true\nname = \"synthetic:eleven\"\n", "source.flip: "},
+        Case{synthetic + "[telemetry]\ndestinations = [\"nowhere:1\"]\n", "nowhere"},
+        Case{synthetic + "[telemetry]\nkey_file = "
+                         "\"/no/such.key\"\n",
+             "/no/such.key"}}) {
     const fs::path path = folder / "bad.toml";
     std::ofstream(path) << bad.toml;
     const ProgramResult done = run_program({kDaemon, "--config", path.string()});
@@ -378,61 +381,38 @@ TEST(Stereotrackd, EnforceRefusesToStartWithoutTheRightsAndSaysHowToGrantThem) {
   EXPECT_NE(done.err.find("to grant it: "), std::string::npos) << done.err;
 }
 
-// The black box of a live run, on demand; its replay gives what the run had sent over UDP, byte for byte.
-TEST(Stereotrackd, ARecordingOfALiveRunReplaysItsTelemetryByteForByte) {
-  const TempDir folder;
-  Ear ear;
-  const fs::path recordings = folder / "recordings";
-  Program daemon({kDaemon,
-                  "--config",
-                  small(folder.path()),
-                  "--set",
-                  "synthetic.width=320",
-                  "--set",
-                  "synthetic.height=240",
-                  "--set",
-                  "synthetic.frames=60",
-                  "--set",
-                  "record.on=true",
-                  "--set",
-                  "record.seconds=2",
-                  "--set",
-                  "record.seconds_after=0.5",
-                  "--set",
-                  "record.on_deadline=false",
-                  "--set",
-                  "record.directory=" + recordings.string(),
-                  "--set",
-                  "telemetry.destinations=" + ear.where()});
-  ASSERT_TRUE(wait_for([&] {
-    ear.listen();
-    return ear.messages().size() > 150;
-  })) << daemon.err_so_far();
-  ASSERT_EQ(kill(daemon.pid(), SIGUSR1), 0);
-  const auto written = [&]() -> std::string {
-    if (!fs::exists(recordings)) return {};
-    for (const auto& entry : fs::directory_iterator(recordings)) {
-      if (entry.path().extension() == ".strec" && entry.path().string().find("demand") != std::string::npos) {
-        return entry.path().string();
-      }
-    }
-    return {};
-  };
-  ASSERT_TRUE(wait_for([&] {
-    ear.listen();
-    return !written().empty();
-  })) << daemon.err_so_far();
-  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
-  EXPECT_EQ(daemon.wait().exit_code, 0);
-  ear.listen();
+/// What makes a small run record: 320x240, two seconds and a half.
+std::vector<std::string> recording_daemon(const std::string& config, const fs::path& recordings, const Ear& ear) {
+  std::vector<std::string> command{kDaemon, "--config", config};
+  for (const std::string& set :
+       {std::string("synthetic.width=320"), std::string("synthetic.height=240"), std::string("synthetic.frames=60"),
+        std::string("record.on=true"), std::string("record.seconds=2"), std::string("record.seconds_after=0.5"),
+        std::string("record.on_deadline=false"), "record.directory=" + recordings.string(),
+        "telemetry.destinations=" + ear.where()}) {
+    command.insert(command.end(), {"--set", set});
+  }
+  return command;
+}
 
-  const record::RecordingSource recording(written());
+/// Recordings with this cause that are whole.
+std::vector<std::string> written_for(const std::string& cause, const fs::path& recordings) {
+  std::vector<std::string> found;
+  if (!fs::exists(recordings)) return found;
+  for (const auto& entry : fs::directory_iterator(recordings)) {
+    if (entry.path().filename().string().ends_with("-" + cause + ".strec")) found.push_back(entry.path().string());
+  }
+  return found;
+}
+
+/// The replay of a recording gives what the run had sent over UDP, byte for byte.
+void expect_replay_is_the_run(const std::string& recorded, const Ear& ear, const fs::path& out) {
+  const record::RecordingSource recording(recorded);
   ASSERT_TRUE(recording.about().exact);
   ASSERT_GT(recording.outputs().size(), 30U);
-  const ProgramResult replay = run_program({kTool, "replay", written(), "--out", (folder / "out").string()});
+  const ProgramResult replay = run_program({kTool, "replay", recorded, "--out", out.string()});
   ASSERT_EQ(replay.exit_code, 0) << replay.err;
   // telemetry.bin: each datagram after its length.
-  const std::string file = read_text(folder / "out" / "telemetry.bin");
+  const std::string file = read_text(out / "telemetry.bin");
   std::map<std::uint64_t, std::vector<std::byte>> replayed;
   std::size_t targets = 0;
   for (std::size_t at = 0; at + 4 <= file.size();) {
@@ -453,6 +433,142 @@ TEST(Stereotrackd, ARecordingOfALiveRunReplaysItsTelemetryByteForByte) {
     ASSERT_NE(live, ear.messages().end()) << sequence;
     EXPECT_TRUE(live->second == bytes) << "message " << sequence;
   }
+}
+
+// The black box of a live run, on demand.
+TEST(Stereotrackd, ARecordingOfALiveRunReplaysItsTelemetryByteForByte) {
+  const TempDir folder;
+  Ear ear;
+  const fs::path recordings = folder / "recordings";
+  Program daemon(recording_daemon(small(folder.path()), recordings, ear));
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return ear.messages().size() > 150;
+  })) << daemon.err_so_far();
+  ASSERT_EQ(kill(daemon.pid(), SIGUSR1), 0);
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return !written_for("demand", recordings).empty();
+  })) << daemon.err_so_far();
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+  ear.listen();
+  expect_replay_is_the_run(written_for("demand", recordings).front(), ear, folder / "out");
+}
+
+std::string input_at(const fs::path& fifo, const std::string& more = "") {
+  return "[[input]]\nname = \"door\"\nline = \"sim:" + fifo.string() + "\"\n" + more;
+}
+
+// A person's hand: echo 1 > FIFO.
+void press(const fs::path& fifo) { std::ofstream(fifo) << "1\n0\n"; }
+
+TEST(Stereotrackd, AnEdgeOfAnInputIsRecordedAndReplaysByteForByte) {
+  const TempDir folder;
+  Ear ear;
+  const fs::path recordings = folder / "recordings";
+  Program daemon(recording_daemon(small(folder.path(), input_at(folder / "door")), recordings, ear));
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return ear.messages().size() > 150;
+  })) << daemon.err_so_far();
+  EXPECT_TRUE(written_for("gpio", recordings).empty());
+  press(folder / "door");
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return !written_for("gpio", recordings).empty();
+  })) << daemon.err_so_far();
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+  ear.listen();
+  expect_replay_is_the_run(written_for("gpio", recordings).front(), ear, folder / "out");
+  EXPECT_FALSE(fs::exists(folder / "door")) << "let go";
+}
+
+/// The value of a figure in `metrics.file`; -1: it is not there.
+int figure(const fs::path& file, const std::string& name) {
+  const std::string text = read_text(file);
+  const std::string whole = "\nstereotrack_" + name + " ";
+  const std::size_t at = text.find(whole);
+  return at == std::string::npos ? -1 : std::stoi(text.substr(at + whole.size()));
+}
+
+int lines_with(const std::string& text, const std::string& what) {
+  int count = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
+  return count;
+}
+
+TEST(Stereotrackd, AnInputThatIsPulledOutIsToldOnceAndReadAgainWhenItIsBack) {
+  const TempDir folder;
+  fs::create_directory(folder / "usb");
+  const fs::path door = folder / "usb" / "door";
+  const fs::path figures = folder / "figures.prom";
+  const std::string labels = "{input=\"door\",line=\"sim:" + door.string() + "\"}";
+  Program daemon(
+      {kDaemon, "--config", small(folder.path(), input_at(door)), "--set", "metrics.file=" + figures.string()});
+  ASSERT_TRUE(wait_for([&] { return figure(figures, "input_there" + labels) == 1; })) << daemon.err_so_far();
+  press(door);
+  EXPECT_TRUE(wait_for([&] { return figure(figures, "input_edges_total" + labels) == 1; })) << "rising edges alone";
+
+  fs::rename(folder / "usb", folder / "away");
+  EXPECT_TRUE(wait_for([&] { return figure(figures, "input_there" + labels) == 0; }));
+  EXPECT_TRUE(wait_for([&] { return figure(figures, "health") % 1024 >= 512; })) << read_text(figures);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // some rounds of the service
+  fs::rename(folder / "away", folder / "usb");
+  EXPECT_TRUE(wait_for([&] { return figure(figures, "input_there" + labels) == 1; }));
+  press(door);
+  EXPECT_TRUE(wait_for([&] { return figure(figures, "input_edges_total" + labels) == 2; }));
+  EXPECT_EQ(figure(figures, "gpio_chips_lost_total{lines=\"inputs\"}"), 1);
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  const ProgramResult done = daemon.wait();
+  EXPECT_EQ(done.exit_code, 0);
+  EXPECT_EQ(lines_with(done.err, "GPIO inputs sim:" + door.string() + " fail: No such device"), 1) << done.err;
+  EXPECT_EQ(lines_with(done.err, "GPIO inputs sim:" + door.string() + " work again after"), 1) << done.err;
+  EXPECT_EQ(lines_with(done.err, "GPIO inputs"), 2) << done.err;
+}
+
+TEST(Stereotrackd, SighupTakesOverInputsAndRefusesThoseThatCannotBeHad) {
+  const TempDir folder;
+  Ear ear;
+  const fs::path recordings = folder / "recordings";
+  const fs::path first = folder / "first";
+  const fs::path second = folder / "second";
+  const fs::path figures = folder / "figures.prom";
+  const std::string metrics = "[metrics]\nfile = \"" + figures.string() + "\"\n";
+  Program daemon(recording_daemon(small(folder.path(), metrics + "[record]\non_input = false\n" + input_at(first)),
+                                  recordings, ear));
+  ASSERT_TRUE(wait_for([&] {
+    ear.listen();
+    return ear.messages().size() > 50;
+  })) << daemon.err_so_far();
+  press(first);
+  ASSERT_TRUE(wait_for([&] { return read_text(figures).find("input_edges_total{") != std::string::npos; }));
+
+  (void)small(folder.path(), metrics + input_at(folder / "no" / "such" / "folder"));
+  ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);
+  ASSERT_TRUE(wait_for([&] { return daemon.err_so_far().find("reload: nothing to take over") != std::string::npos; }))
+      << daemon.err_so_far();
+  EXPECT_NE(daemon.err_so_far().find("reload: input: cannot change: "), std::string::npos) << daemon.err_so_far();
+  EXPECT_TRUE(fs::is_fifo(first)) << "the lines of before are read on";
+
+  (void)small(folder.path(), metrics + input_at(second, "edge = \"falling\"\napart_ms = 0\n"));
+  ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);
+  ASSERT_TRUE(wait_for([&] { return daemon.err_so_far().find("reload: taken over") != std::string::npos; }))
+      << daemon.err_so_far();
+  EXPECT_TRUE(fs::is_fifo(second));
+  EXPECT_FALSE(fs::exists(first));
+  const std::string labels = "{input=\"door\",line=\"sim:" + second.string() + "\"}";
+  EXPECT_TRUE(wait_for([&] { return figure(figures, "input_edges_total" + labels) == 1; })) << "that of before";
+  EXPECT_EQ(figure(figures, "input_triggers_total" + labels), 0) << "record.on_input was false";
+  press(second);
+  EXPECT_TRUE(wait_for([&] {
+    ear.listen();
+    return !written_for("gpio", recordings).empty();
+  })) << daemon.err_so_far();
+  EXPECT_TRUE(wait_for([&] { return figure(figures, "input_triggers_total" + labels) == 1; }));
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
 }
 
 }  // namespace

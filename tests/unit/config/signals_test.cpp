@@ -264,5 +264,72 @@ TEST(Signals, MetresNeedAKnownUnit) {
             "");
 }
 
+/// An input that is good; what follows is the rest of it.
+std::string input(const std::string& rest) { return "[[input]]\nname = \"door\"\nline = \"sim:door\"\n" + rest; }
+
+TEST(Inputs, AllThatCanBeSaid) {
+  const Configuration c = loaded(R"(
+[[input]]
+name = "door"
+line = "pinctrl-bcm2711:GPIO5"
+edge = "both"
+active = "low"
+bias = "pull_up"
+debounce_ms = 5
+apart_ms = 250.5
+[[input]]
+name = "other"
+line = "sim:/tmp/other"
+[record]
+on_input = false
+)");
+  ASSERT_EQ(c.inputs.size(), 2U);
+  const InputConfig& door = c.inputs[0];
+  EXPECT_EQ(door.name, "door");
+  EXPECT_EQ(door.line, "pinctrl-bcm2711:GPIO5");
+  EXPECT_EQ(door.edge, InputEdge::kBoth);
+  EXPECT_EQ(door.active, ActiveLevel::kLow);
+  EXPECT_EQ(door.bias, InputBias::kPullUp);
+  EXPECT_EQ(door.debounce_ms, 5);
+  EXPECT_EQ(door.apart_ms, 250.5);
+  EXPECT_EQ(c.inputs[1], (InputConfig{.name = "other", .line = "sim:/tmp/other"}));
+  EXPECT_FALSE(c.record.on_input);
+  EXPECT_TRUE(loaded(input("")).record.on_input);
+}
+
+TEST(Inputs, ContradictionsAreToldAtTheKeyThatSaysThem) {
+  EXPECT_EQ(refused("[[input]]\nname = \"door\"\n"),
+            "rig.toml:1:1: input[1].line: it is missing: give a text in quotes");
+  EXPECT_EQ(
+      refused("[[input]]\nname = \"door\"\nline = \"gpiochip0\"\n"),
+      "rig.toml:3:8: input[1].line: \"gpiochip0\" is no GPIO line: write CHIP:LINE, for example \"gpiochip0:17\", "
+      "\"pinctrl-bcm2711:GPIO17\" or \"sim:near\"");
+  EXPECT_EQ(refused(input("bias = \"up\"\n")),
+            "rig.toml:4:8: input[1].bias: \"up\" is not known: give one of \"as_is\", \"none\", \"pull_up\", "
+            "\"pull_down\"");
+  EXPECT_EQ(refused(input("apart_ms = -1\n")),
+            "rig.toml:4:12: input[1].apart_ms: -1 is out of range: give 0 to 3600000 ms");
+  EXPECT_EQ(
+      refused(input("") + "[[input]]\nname = \"door\"\nline = \"sim:b\"\n"),
+      "rig.toml:5:8: input[2].name: \"door\" is that of input[1], too (rig.toml:2:8): give each input its own name");
+  EXPECT_EQ(refused(input("") + "[[input]]\nname = \"b\"\nline = \"sim:door\"\n"),
+            "rig.toml:6:8: input[2].line: \"sim:door\" is that of input[1], too (rig.toml:3:8): give each input its "
+            "own line");
+  EXPECT_EQ(
+      refused(signal("") + "[[input]]\nname = \"door\"\nline = \"sim:near\"\n"),
+      "rig.toml:6:8: input[1].line: \"sim:near\" is driven by signal[1] (rig.toml:3:8): a line is read or driven");
+}
+
+TEST(Inputs, SixteenAndNoMore) {
+  std::string toml;
+  for (std::size_t i = 0; i <= kMaxInputs; ++i) {
+    if (i == kMaxInputs) {
+      EXPECT_EQ(refused(toml), "");
+    }
+    toml += "[[input]]\nname = \"n" + std::to_string(i) + "\"\nline = \"sim:l" + std::to_string(i) + "\"\n";
+  }
+  EXPECT_EQ(refused(toml), "rig.toml:49:1: input: there may be 16: leave one out");
+}
+
 }  // namespace
 }  // namespace stereotrack::config

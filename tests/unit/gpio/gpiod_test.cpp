@@ -43,6 +43,27 @@ TEST(Gpiod, RequestOfAChipThatWentIsRefused) {
   EXPECT_EQ(told, "GPIO line gpiochip77:3: /dev/gpiochip77 cannot be opened: No such file or directory");
 }
 
+TEST(Gpiod, InputsAreRefusedAlike) {
+  const WantedInput line{{.name = {"gpiochip77", "3"}}, 3};
+  EXPECT_EQ(refusal_of([&] {
+              static_cast<void>(request_inputs("/dev/gpiochip77", {&line, 1}, "test"));
+            }),
+            "GPIO line gpiochip77:3: /dev/gpiochip77 cannot be opened: No such file or directory");
+  const std::vector<InputSpec> specs = {{.name = {"sim", "beside_in"}}, {.name = {"/dev/null", "17"}}};
+  EXPECT_EQ(refusal_of([&] { static_cast<void>(open_inputs(specs, "test")); }),
+            "GPIO line /dev/null:17: /dev/null is not a GPIO chip: gpiodetect lists them");
+  EXPECT_EQ(open_inputs(std::vector{specs[0]}, "test").size(), 1U);
+}
+
+// A silently undebounced input would count each bounce.
+TEST(Gpiod, DebouncingIsRefusedWhereTheLibraryHasNone) {
+  const std::vector<InputSpec> specs = {{.name = {"gpiochip0", "3"}, .debounce = std::chrono::milliseconds(5)}};
+  EXPECT_EQ(refusal_of([&] { check_inputs(specs); }),
+            interface() == "2" ? ""
+                               : "GPIO line gpiochip0:3: libgpiod 1.x, which this build has, debounces nothing: leave "
+                                 "it out, or build with libgpiod 2.x");
+}
+
 TEST(Gpiod, OpenLinesTellsItAndLetsTheOthersGo) {
   const std::vector<LineSpec> specs = {{{"sim", "beside"}, false, false}, {{"/dev/null", "17"}, false, false}};
   EXPECT_EQ(open_refusal(specs), "GPIO line /dev/null:17: /dev/null is not a GPIO chip: gpiodetect lists them");

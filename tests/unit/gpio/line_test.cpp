@@ -129,23 +129,107 @@ TEST(OutputLines, TransitionsAreCountedWithTheTimeThatWasTold) {
 
 TEST(OutputLines, AChipThatRefusesIsToldAndTriedAgain) {
   OutputLines lines = open_lines(std::vector{sim("gone_a"), sim("gone_b")}, "test");
-  simulated_chip::set_gone("gone_b", true);
+  simulated_chip::set_refusing("gone_b", EIO);
   OutputLines::SetResult result = lines.set(0b01, at(1));
   EXPECT_EQ(result.changed, 0U);
   EXPECT_EQ(result.failed, 0b11U);
-  EXPECT_EQ(lines.last_error(), ENODEV);
+  EXPECT_EQ(lines.last_error(), EIO);
+  EXPECT_EQ(lines.failing(), 0b11U);
+  EXPECT_EQ(lines.gone(), 0U) << "it is there, and keeps its request";
+  EXPECT_EQ(lines.outages(), 0U);
   EXPECT_EQ(lines.read(0).failures, 1U);
   EXPECT_FALSE(lines.read(0).active);
   EXPECT_EQ(level("gone_a"), false);
   // Even without anything new to tell: what the lines show is not known.
   EXPECT_EQ(lines.set(0b00, at(2)).failed, 0b11U);
-  simulated_chip::set_gone("gone_b", false);
+  EXPECT_EQ(lines.reopen(), 0U) << "it would be busy";
+  simulated_chip::set_refusing("gone_b", 0);
   result = lines.set(0b01, at(3));
   EXPECT_EQ(result.changed, 0b01U);
   EXPECT_EQ(result.failed, 0U);
+  EXPECT_EQ(lines.failing(), 0U);
   EXPECT_EQ(level("gone_a"), true);
   EXPECT_EQ(lines.read(0).changed, at(3));
   EXPECT_EQ(lines.read(0).failures, 2U);
+}
+
+TEST(OutputLines, AChipThatWentIsRequestedAnewAndDrivenAsTheRulesSay) {
+  const std::vector<LineSpec> specs{sim("usb_a"), sim("usb_b", false, true), sim("usb_c")};
+  OutputLines lines = open_lines(specs, "test");
+  static_cast<void>(lines.set(0b101, at(1)));
+  simulated_chip::set_gone("usb_b", true);
+  EXPECT_EQ(lines.set(0b100, at(2)).failed, 0b111U);
+  EXPECT_EQ(lines.gone(), 0b111U);
+  EXPECT_EQ(lines.outages(), 1U);
+  std::string why;
+  EXPECT_EQ(lines.reopen(&why), 0U);
+  EXPECT_EQ(why, "GPIO line sim:usb_b: no such chip: the simulated one is gone");
+  EXPECT_EQ(lines.set(0b100, at(3)).failed, 0b111U);
+  EXPECT_EQ(lines.outages(), 1U) << "the same";
+
+  simulated_chip::set_gone("usb_b", false);
+  EXPECT_EQ(lines.set(0b100, at(4)).failed, 0b111U) << "what was requested before it went is dead for good";
+  EXPECT_EQ(lines.reopen(), 0b111U);
+  EXPECT_EQ(level("usb_b"), true) << "the safe state, from the request on";
+  EXPECT_EQ(level("usb_a"), false);
+  EXPECT_EQ(lines.gone(), 0b111U) << "until it is driven";
+  EXPECT_EQ(lines.reopen(), 0U) << "it is on its way already";
+  const OutputLines::SetResult result = lines.set(0b100, at(5));
+  EXPECT_EQ(result.failed, 0U);
+  EXPECT_EQ(lines.gone(), 0U);
+  EXPECT_EQ(lines.failing(), 0U);
+  EXPECT_EQ(level("usb_a"), false);
+  EXPECT_EQ(level("usb_b"), false);
+  EXPECT_EQ(level("usb_c"), true) << "nothing changed for it: it is driven all the same";
+  EXPECT_TRUE(lines.read(2).active);
+  EXPECT_EQ(lines.reopen(), 0U);
+  EXPECT_EQ(open_refusal(std::vector{sim("usb_a")}), "GPIO line sim:usb_a: busy: held by \"test\"");
+
+  // And again: there is a place for what was given up.
+  for (int i = 0; i < 3; ++i) {
+    simulated_chip::set_gone("usb_c", true);
+    EXPECT_EQ(lines.refresh(at(10 + i)).failed, 0b111U) << "though nothing changes";
+    simulated_chip::set_gone("usb_c", false);
+    EXPECT_EQ(lines.reopen(), 0b111U);
+    EXPECT_EQ(lines.refresh(at(20 + i)).failed, 0U);
+    EXPECT_EQ(level("usb_c"), true);
+  }
+  EXPECT_EQ(lines.outages(), 4U);
+}
+
+TEST(OutputLines, HeldSafeAfterAChipCameBack) {
+  OutputLines lines = open_lines(std::vector{sim("held_back", false, true)}, "test");
+  simulated_chip::set_gone("held_back", true);
+  static_cast<void>(lines.set(0, at(1)));
+  simulated_chip::set_gone("held_back", false);
+  EXPECT_EQ(lines.reopen(), 1U);
+  static_cast<void>(lines.set(0, at(2)));
+  EXPECT_EQ(level("held_back"), false);
+  EXPECT_TRUE(lines.hold_safe());
+  EXPECT_EQ(level("held_back"), true);
+  EXPECT_EQ(lines.reopen(), 0U);
+}
+
+TEST(OutputLines, AChipGoesAndComesWhileItIsDriven) {
+  OutputLines lines = open_lines(std::vector{sim("flapping"), sim("flapping_too")}, "test");
+  std::atomic<bool> stop{false};
+  std::thread driver([&] {
+    for (int i = 0; !stop.load(); ++i) static_cast<void>(lines.set(static_cast<LineBits>(i & 3), at(i)));
+  });
+  for (int i = 0; i < 100; ++i) {
+    simulated_chip::set_gone("flapping", true);
+    while (lines.gone() == 0) std::this_thread::yield();
+    simulated_chip::set_gone("flapping", false);
+    EXPECT_EQ(lines.reopen(), 0b11U);
+    while (lines.gone() != 0) std::this_thread::yield();
+  }
+  stop = true;
+  driver.join();
+  EXPECT_EQ(lines.outages(), 100U);
+  static_cast<void>(lines.set(0b00, at(1)));
+  EXPECT_EQ(lines.set(0b01, at(1)).failed, 0U);
+  EXPECT_EQ(level("flapping"), true);
+  EXPECT_EQ(level("flapping_too"), false);
 }
 
 TEST(OutputLines, MoveWithTheirLines) {

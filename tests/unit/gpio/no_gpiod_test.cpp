@@ -18,6 +18,12 @@ TEST(WithoutGpiod, ARealChipIsRefusedWithTheWayOut) {
       "for a simulated line");
 }
 
+TEST(WithoutGpiod, AnInputOfARealChipIsRefusedAlike) {
+  const std::vector<InputSpec> specs = {{.name = {"gpiochip0", "17"}}};
+  EXPECT_NE(refusal_of([&] { static_cast<void>(open_inputs(specs, "test")); }).find("this build has no libgpiod"),
+            std::string::npos);
+}
+
 TEST(WithoutGpiod, TheSimulatedChipWorks) {
   OutputLines lines = open_lines(std::vector{LineSpec{{"sim", "a"}, false, false}}, "test");
   lines.set(1, MonotonicTime{});

@@ -43,9 +43,15 @@ TEST(SimulatedChip, GoneIsRefusedForAllLinesOfTheRequest) {
   set_gone("away", true);
   EXPECT_EQ(lease->set(0b11), ENODEV);
   EXPECT_EQ(level("here"), false);
+  EXPECT_EQ(refusal_of([&] { static_cast<void>(request(lines, "test")); }),
+            "GPIO line sim:away: no such chip: the simulated one is gone");
   set_gone("away", false);
-  EXPECT_EQ(lease->set(0b11), 0);
+  EXPECT_EQ(lease->set(0b11), ENODEV) << "it was requested of the chip that went";
+  auto again = request(lines, "test");
+  lease.reset();
+  EXPECT_EQ(again->set(0b11), 0);
   EXPECT_EQ(level("here"), true);
+  EXPECT_NE(refusal_of([&] { static_cast<void>(request(lines, "test")); }), "") << "the dead one let nothing go";
 }
 
 /// Takes names until there are no more, lets them go, and says what it was told at the end and whether the first may be

@@ -12,6 +12,7 @@
 #include "firmware-app/runtime/allocation_count.hpp"
 #include "firmware-app/runtime/clock.hpp"
 #include "tests/support/live_rig.hpp"
+#include "tests/support/temp_dir.hpp"
 
 // Real threads in real time, on a machine that may keep any of them from running: what is asserted holds however late
 // they are. Exact times are the business of output_schedule_test.cpp, whose clock is simulated.
@@ -30,6 +31,7 @@ signals::Signal signal(signals::Condition when) {
   signals::Signal signal;
   signal.when = when;
   signal.half_period = milliseconds(50);
+  signal.limit_s = 0.001;
   return signal;
 }
 
@@ -215,6 +217,197 @@ TEST(Daemon, AChipThatIsGoneIsCountedAndNothingElseStops) {
   gpio::simulated_chip::set_gone("gone", false);
   EXPECT_GT(rig.daemon->vitals().lines_failed.get(), 0U);
   EXPECT_GT(rig.ear.pairs().size(), 0U);
+}
+
+bool is_well(const LiveRig& rig) {
+  return !rig.ear.statuses().empty() && (rig.ear.statuses().back().health & telemetry::kHealthLineFailed) == 0;
+}
+
+TEST(Daemon, AnOutputChipThatWentIsDrivenAgainWithoutARestart) {
+  LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce), kLatency, {},
+              {{.name = {"sim", "usb_heart"}}, {.name = {"sim", "usb_still"}}},
+              {signal(signals::Condition::kHeartbeat), signal(signals::Condition::kTimeToReachBelow)});
+  const auto beats = [] { return gpio::simulated_chip::edges("usb_heart"); };
+  int step = 0;
+  std::uint64_t before = 0;
+  rig.run([&] {
+    if (step == 0 && beats() > 4 && is_well(rig)) {
+      gpio::simulated_chip::set_gone("usb_heart", true);
+      ++step;
+    } else if (step == 1 && !is_well(rig)) {
+      EXPECT_EQ(rig.daemon->lines().gone(), 0b11U);
+      before = beats();
+      gpio::simulated_chip::set_gone("usb_heart", false);
+      ++step;
+    } else if (step == 2 && beats() > before + 4 && is_well(rig)) {
+      ++step;
+    }
+    return step == 3;
+  });
+  EXPECT_EQ(step, 3);
+  EXPECT_EQ(rig.daemon->lines().gone(), 0U);
+  EXPECT_EQ(rig.daemon->lines().outages(), 1U);
+  EXPECT_EQ(rig.daemon->vitals().publisher_allocations.get(), 0U);
+  EXPECT_EQ(gpio::simulated_chip::level("usb_heart"), false) << "safe at the end, on the new request";
+}
+
+TEST(Daemon, AnOutputChipThatWentIsNoticedThoughNothingChanges) {
+  LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce), kLatency, {},
+              {{.name = {"sim", "usb_quiet"}}}, {signal(signals::Condition::kTimeToReachBelow)});
+  bool went = false;
+  rig.run([&] {
+    if (!went && !rig.ear.pairs().empty()) gpio::simulated_chip::set_gone("usb_quiet", went = true);
+    return went && rig.daemon->lines().gone() != 0;
+  });
+  gpio::simulated_chip::set_gone("usb_quiet", false);
+  EXPECT_EQ(gpio::simulated_chip::edges("usb_quiet"), 0U);
+  EXPECT_EQ(rig.daemon->lines().outages(), 1U);
+}
+
+Inputs::Setup button(const std::string& line, bool record = true) {
+  Inputs::Input input;
+  input.name = "button";
+  input.spec = {.name = {"sim", line}, .edges = gpio::Edges::kBoth};
+  input.apart = std::chrono::seconds(5);
+  return {{input}, record};
+}
+
+TEST(Daemon, AnEdgeOfAnInputIsAReasonToRecordUnlessItComesTooSoon) {
+  const test::TempDir folder;
+  LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce),
+              {"latency.output_ms=30", "record.on=true", "record.seconds=1", "record.seconds_after=0.1",
+               "record.on_deadline=false", "record.directory=" + folder.path().string()});
+  rig.daemon->inputs().exchange(button("button"));
+  const auto drive = [](bool high, int s) {
+    gpio::simulated_chip::drive("button", high, MonotonicTime(std::chrono::seconds(s)));
+  };
+  const record::BlackBox::Counters& box = rig.daemon->black_box()->counters();
+  int step = 0;
+  rig.run([&] {
+    if (step == 0 && box.frames.load() > 20) {
+      for (const int s : {100, 101, 104}) drive(s != 101, s);  // the last two come too soon
+      ++step;
+    } else if (step == 1 && box.recordings.load() == 1) {
+      drive(false, 106);
+      ++step;
+    }
+    return box.recordings.load() == 2 && rig.ear.statuses().size() > 1;
+  });
+  EXPECT_EQ(rig.daemon->inputs().events(0), 4U);
+  EXPECT_EQ(rig.daemon->inputs().lost(0), 0U);
+  EXPECT_EQ(rig.daemon->inputs().triggers(0), 2U);
+  EXPECT_EQ(box.triggers.load() + box.merged.load(), 2U);
+  EXPECT_NE(rig.daemon->black_box()->last_recording().find("-gpio.strec"), std::string::npos);
+  const telemetry::Status& status = rig.ear.statuses().back();
+  EXPECT_EQ(status.recorder_slots, rig.daemon->black_box()->slots());
+  EXPECT_GT(status.recorder_slots_free_low, 0U);
+  EXPECT_LT(status.recorder_slots_free_low, status.recorder_slots);
+}
+
+TEST(Daemon, AnEdgeIsCountedAndNoMoreWhereItIsNoReasonToRecord) {
+  LiveRig rig(film_of_scene(1, 30, kPeriod), kLatency);
+  rig.daemon->inputs().exchange(button("button_idle", false));
+  gpio::simulated_chip::drive("button_idle", true, MonotonicTime(std::chrono::seconds(100)));
+  rig.run();
+  EXPECT_EQ(rig.daemon->inputs().events(0), 1U);
+  EXPECT_EQ(rig.daemon->inputs().triggers(0), 0U);
+}
+
+TEST(Daemon, AnInputChipThatWentIsToldInTheHealthAndReadAgain) {
+  LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce), kLatency);
+  rig.daemon->inputs().exchange(button("usb_button"));
+  int step = 0;
+  rig.run([&] {
+    if (step == 0 && is_well(rig)) {
+      gpio::simulated_chip::set_gone("usb_button", true);
+      ++step;
+    } else if (step == 1 && !is_well(rig)) {
+      gpio::simulated_chip::set_gone("usb_button", false);
+      ++step;
+    } else if (step == 2 && is_well(rig)) {
+      gpio::simulated_chip::drive("usb_button", true, MonotonicTime(std::chrono::seconds(100)));
+      ++step;
+    }
+    return step == 3 && rig.daemon->inputs().events(0) == 1;
+  });
+  EXPECT_EQ(step, 3);
+  EXPECT_EQ(rig.daemon->inputs().outages(), 1U);
+}
+
+TEST(Inputs, ExchangedTheyKeepTheirCountsAndWhatCannotBeHadChangesNothing) {
+  Inputs inputs(button("swap_a"));
+  gpio::simulated_chip::drive("swap_a", true, MonotonicTime(std::chrono::seconds(1)));
+  inputs.take(nullptr);
+  EXPECT_EQ(inputs.events(0), 1U);
+  inputs.exchange(button("swap_b"));
+  EXPECT_EQ(inputs.events(0), 1U) << "of the same name";
+  gpio::simulated_chip::drive("swap_b", true, MonotonicTime(std::chrono::seconds(2)));
+  inputs.take(nullptr);
+  EXPECT_EQ(inputs.events(0), 2U);
+
+  const Inputs other(button("swap_held"));
+  EXPECT_THROW(inputs.exchange(button("swap_held")), std::runtime_error);
+  EXPECT_EQ(to_string(inputs.line(0)), "sim:swap_b");
+  gpio::simulated_chip::drive("swap_b", false, MonotonicTime(std::chrono::seconds(3)));
+  inputs.take(nullptr);
+  EXPECT_EQ(inputs.events(0), 3U);
+  inputs.exchange({});
+  EXPECT_EQ(inputs.size(), 0U);
+  EXPECT_EQ(inputs.descriptor(), -1);
+}
+
+TEST(LineCare, AsksAtOnceThenEverMoreRarelyAndBeginsAnewAfterARest) {
+  using std::chrono::seconds;
+  LineCare care("test");
+  const auto at = [](int ms) { return MonotonicTime(seconds(1000) + milliseconds(ms)); };
+  std::vector<int> asked;
+  const auto round = [&](int from, int to, gpio::LineBits gone) {
+    for (int ms = from; ms < to; ms += 100) {
+      if (care.is_due(gone, at(ms))) asked.push_back(ms);
+    }
+  };
+  round(0, 1000, 0);
+  EXPECT_TRUE(asked.empty());
+  round(1000, 14'000, 1);
+  EXPECT_EQ(asked, (std::vector<int>{1000, 1500, 2500, 4500, 8500, 12'500}));
+  asked.clear();
+  round(14'000, 15'000, 0);
+  round(15'000, 20'000, 1);
+  EXPECT_EQ(asked, (std::vector<int>{16'500})) << "a short rest is none";
+  asked.clear();
+  round(20'000, 25'000, 0);
+  round(25'000, 26'000, 1);
+  EXPECT_EQ(asked, (std::vector<int>{25'000, 25'500}));
+}
+
+/// Pairs with a skew.
+class Skewed final : public capture::FrameSource {
+ public:
+  explicit Skewed(std::vector<std::chrono::microseconds> skews)
+      : scene_(1, static_cast<int>(skews.size()), kPeriod), skews_(std::move(skews)) {}
+  [[nodiscard]] const capture::SourceInfo& info() const noexcept override { return scene_.info(); }
+  [[nodiscard]] capture::Next next(FramePair& out) noexcept override {
+    const capture::Next next = scene_.next(out);
+    if (next == capture::Next::kPair) out.skew = skews_[out.ordinal - 1];
+    return next;
+  }
+  [[nodiscard]] const std::string& skip_reason() const noexcept override { return scene_.skip_reason(); }
+  void skip_to(std::uint64_t ordinal) noexcept override { scene_.skip_to(ordinal); }
+
+ private:
+  test::SceneSource scene_;
+  std::vector<std::chrono::microseconds> skews_;
+};
+
+TEST(Daemon, TheStatusTellsTheLargestSkewOfPairsWhateverItsSign) {
+  using std::chrono::microseconds;
+  Skewed source({microseconds(12), microseconds(-340), microseconds(25)});
+  LiveRig rig(std::make_unique<capture::Film>(source, capture::Film::Config{.repeat = capture::Film::Repeat::kLoop}),
+              kLatency);
+  rig.run([&] { return rig.ear.statuses().size() >= 2; });
+  ASSERT_FALSE(rig.ear.statuses().empty());
+  EXPECT_EQ(rig.ear.statuses().back().skew_max_us, 340U);
+  EXPECT_EQ(rig.ear.statuses().back().recorder_slots, 0U) << "it does not record";
 }
 
 TEST(Daemon, AStatusLeavesEverySecondAlsoWithoutPairs) {
