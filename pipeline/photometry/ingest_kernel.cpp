@@ -22,7 +22,9 @@ namespace {
 #if HWY_TARGET == HWY_SCALAR
 
 int copied_pixels(const std::uint8_t*, int, std::uint8_t*) { return 0; }
-int bgr_pixels(const std::uint8_t*, int, const PlaneRow&) { return 0; }
+int unpacked_pixels(const std::uint8_t*, SampleLayout, int, std::uint8_t*) { return 0; }
+int colour_pixels(const std::uint8_t*, ColourOrder, int, const PlaneRow&) { return 0; }
+int bayer_pixels(const BayerRows&, int, const PlaneRow&) { return 0; }
 int packed_pixels(const std::uint8_t*, PackedOrder, int, const PlaneRow&) { return 0; }
 int chroma_pairs(const std::uint8_t*, int, std::uint8_t*, std::uint8_t*) { return 0; }
 
@@ -78,15 +80,20 @@ Word difference_of(Word colour, Word luma) {
   return hn::BitCast(kWords, hn::Min(value, hn::Set(kSigned, 255)));
 }
 
-int bgr_pixels(const std::uint8_t* bgr, int width, const PlaneRow& out) {
+int unpacked_pixels(const std::uint8_t*, SampleLayout, int, std::uint8_t*) { return 0; }
+int bayer_pixels(const BayerRows&, int, const PlaneRow&) { return 0; }
+
+int colour_pixels(const std::uint8_t* pixels, ColourOrder order, int width, const PlaneRow& out) {
   const Luma luma;
   const int lanes = static_cast<int>(hn::Lanes(kBytes));
   int x = 0;
   for (; x + lanes <= width; x += lanes) {
-    Byte b = hn::Zero(kBytes);
-    Byte g = b;
-    Byte r = b;
-    hn::LoadInterleaved3(kBytes, bgr + 3 * x, b, g, r);
+    Byte first = hn::Zero(kBytes);
+    Byte g = first;
+    Byte last = first;
+    hn::LoadInterleaved3(kBytes, pixels + 3 * x, first, g, last);
+    const Byte b = order == ColourOrder::kBlueFirst ? first : last;
+    const Byte r = order == ColourOrder::kBlueFirst ? last : first;
     const Word even_b = even_bytes(b);
     const Word odd_b = odd_bytes(b);
     const Word even_r = even_bytes(r);
@@ -144,7 +151,9 @@ namespace stereotrack {
 namespace {
 
 HWY_EXPORT(copied_pixels);
-HWY_EXPORT(bgr_pixels);
+HWY_EXPORT(unpacked_pixels);
+HWY_EXPORT(colour_pixels);
+HWY_EXPORT(bayer_pixels);
 HWY_EXPORT(packed_pixels);
 HWY_EXPORT(chroma_pairs);
 
@@ -160,16 +169,39 @@ void copy_row_reference(const std::uint8_t* pixels, int width, std::uint8_t* out
   for (int x = 0; x < width; ++x) out[x] = from[x];
 }
 
-void bgr_row_reference(const std::uint8_t* bgr, int width, const PlaneRow& out) noexcept {
+void unpack_row_reference(const std::uint8_t* row, SampleLayout layout, int width, std::uint8_t* out) noexcept {
+  for (int x = 0; x < width; ++x) out[x] = sample_of(layout, row, x);
+}
+
+namespace {
+
+void put_colour(int b, int g, int r, int x, const PlaneRow& out) noexcept {
+  const std::uint8_t y = luma(b, g, r);
+  out.y[x] = y;
+  if (out.cb == nullptr) return;
+  out.cb[x] = chroma_blue(b, y);
+  out.cr[x] = chroma_red(r, y);
+}
+
+}  // namespace
+
+void colour_row_reference(const std::uint8_t* pixels, ColourOrder order, int width, const PlaneRow& out) noexcept {
+  const int blue = order == ColourOrder::kBlueFirst ? 0 : 2;
   for (int x = 0; x < width; ++x) {
-    const int b = bgr[3 * x];
-    const int g = bgr[3 * x + 1];
-    const int r = bgr[3 * x + 2];
-    const std::uint8_t y = luma(b, g, r);
-    out.y[x] = y;
-    if (out.cb == nullptr) continue;
-    out.cb[x] = chroma_blue(b, y);
-    out.cr[x] = chroma_red(r, y);
+    const std::uint8_t* pixel = pixels + 3 * x;
+    put_colour(pixel[blue], pixel[1], pixel[2 - blue], x, out);
+  }
+}
+
+void bayer_row_reference(const BayerRows& rows, int width, const PlaneRow& out) noexcept {
+  const auto& [above, row, below, red, green_first] = rows;
+  for (int x = 0; x < width; ++x) {
+    const bool at_green = (x % 2 == 0) == green_first;
+    const int green = at_green ? row[x] : (above[x] + below[x] + row[x - 1] + row[x + 1] + 2) / 4;
+    const int own = at_green ? (row[x - 1] + row[x + 1] + 1) / 2 : row[x];
+    const int other =
+        at_green ? (above[x] + below[x] + 1) / 2 : (above[x - 1] + above[x + 1] + below[x - 1] + below[x + 1] + 2) / 4;
+    put_colour(red ? other : own, green, red ? own : other, x, out);
   }
 }
 
@@ -199,9 +231,23 @@ void copy_row(const std::uint8_t* pixels, int width, std::uint8_t* out) noexcept
   copy_row_reference(pixels + done, width - done, out + done);
 }
 
-void bgr_row(const std::uint8_t* bgr, int width, const PlaneRow& out) noexcept {
-  const int done = simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(bgr_pixels)(bgr, width, out);
-  bgr_row_reference(bgr + 3 * done, width - done, rest_of(out, done));
+void unpack_row(const std::uint8_t* row, SampleLayout layout, int width, std::uint8_t* out) noexcept {
+  if (layout == SampleLayout::kBytes) return copy_row(row, width, out);
+  const int done =
+      simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(unpacked_pixels)(row, layout, width, out);
+  unpack_row_reference(row + row_bytes(layout, done), layout, width - done, out + done);
+}
+
+void colour_row(const std::uint8_t* pixels, ColourOrder order, int width, const PlaneRow& out) noexcept {
+  const int done =
+      simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(colour_pixels)(pixels, order, width, out);
+  colour_row_reference(pixels + 3 * done, order, width - done, rest_of(out, done));
+}
+
+void bayer_row(const BayerRows& rows, int width, const PlaneRow& out) noexcept {
+  const int done = simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(bayer_pixels)(rows, width, out);
+  const BayerRows rest{rows.above + done, rows.row + done, rows.below + done, rows.red, rows.green_first};
+  bayer_row_reference(rest, width - done, rest_of(out, done));
 }
 
 void packed_row(const std::uint8_t* pixels, PackedOrder order, int width, const PlaneRow& out) noexcept {

@@ -42,10 +42,10 @@ TEST(IngestKernel, EveryColourIsTheReference) {
       bgr[3 * i + 2] = static_cast<std::uint8_t>(i >> 8);
     }
     Out expected(kSize);
-    bgr_row_reference(bgr.data(), kSize, expected.colour());
+    colour_row_reference(bgr.data(), ColourOrder::kBlueFirst, kSize, expected.colour());
     on_each_target([&] {
       Out got(kSize);
-      bgr_row(bgr.data(), kSize, got.colour());
+      colour_row(bgr.data(), ColourOrder::kBlueFirst, kSize, got.colour());
       EXPECT_TRUE(got == expected) << "blue " << b;
     });
   }
@@ -70,8 +70,14 @@ void expect_reference_at_every_length(int step, Rows&& row, Reference&& referenc
   }
 }
 
-TEST(IngestKernel, BgrRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
-  expect_reference_at_every_length(1, bgr_row, bgr_row_reference);
+TEST(IngestKernel, ColourRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  for (const ColourOrder order : {ColourOrder::kBlueFirst, ColourOrder::kRedFirst}) {
+    expect_reference_at_every_length(
+        1, [&](const std::uint8_t* from, int width, const PlaneRow& out) { colour_row(from, order, width, out); },
+        [&](const std::uint8_t* from, int width, const PlaneRow& out) {
+          colour_row_reference(from, order, width, out);
+        });
+  }
 }
 
 TEST(IngestKernel, CopiedRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
