@@ -29,15 +29,16 @@ struct IngestPlanes {
 ///                            (bayer_row(): the equations), then as kBgr8
 /// "As they are" in ITU-R BT.601 of whichever range the camera has; only full range is what kBgr8 gives. A mosaic goes
 /// on beyond its borders as it came: row -1 is row 1, row H is row H - 2, and so for columns, which keeps its colours
-/// in their places. No black level is taken away and no white balance set: what stays the same from frame to frame is
-/// background, and cameras do both better.
+/// in their places. Neither black level nor white balance is seen to: cameras do both, and an offset or a tint that
+/// stays is the background's, too.
 /// In: a picture whose size its format allows (frame.hpp), no wider than `width` where it is a mosaic. Out: planes of
 /// its size; without cb and cr, chroma that lies in rows of its own is not read. histogram: null, or how often each Y
 /// occurs, counted while the row is at hand.
 /// copy: null, or where the picture's bytes go as well, row after row without what lies between (picture_bytes()): what
 /// a recorder keeps. Each row is copied first and read from there, so that the source's memory is still read once.
-/// O(pixels), 0.1 ns a pixel, 0.4 with histogram; what bounds it is how fast the source can be read. One instance a
-/// thread: three rows of a mosaic are kept while it is read; nothing crosses pictures.
+/// O(pixels), 0.1 ns a pixel, 0.2 for colour and mosaics, 0.3 more with histogram; what bounds it is how fast the
+/// source can be read. One instance a thread: three rows of a mosaic are kept while it is read; nothing crosses
+/// pictures.
 class Ingest {
  public:
   /// Faults: kBadSize, a width below 1; kOutOfMemory.
