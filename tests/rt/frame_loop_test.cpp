@@ -1,5 +1,5 @@
-// The frame loop takes nothing from the heap and gives nothing back: a thousand frames of each preset, source format
-// and way of matching, with every stage at work. And the proof that it would show here if it did.
+// The frame loop takes nothing from the heap and gives nothing back: a thousand frames of each preset, kind of source
+// format and way of matching, with every stage at work. And the proof that it would show here if it did.
 #include <gtest/gtest.h>
 
 #include <array>

@@ -15,34 +15,59 @@
 
 namespace stereotrack::test {
 
+/// In which runs of scene_cases.hpp a format takes part: what differs in ingest alone need not be in each of them.
+enum class SceneRuns : std::uint8_t { kEach, kOne, kNone };
+
 /// A layout of pixels that the pipeline reads, and how BGR pixels are laid out so.
 struct SceneFormat {
   const char* name;
   PixelFormat format;
   bool colour;
+  SceneRuns runs;
   void (*pack)(const std::vector<std::uint8_t>& bgr, int width, int height, std::vector<std::uint8_t>& out);
 };
 
 template <PixelFormat kFormat>
-void pack_as(const std::vector<std::uint8_t>& bgr, int width, int height, std::vector<std::uint8_t>& out) {
-  lay_out({bgr.data(), width, height, std::ptrdiff_t{width} * 3, PixelFormat::kBgr8}, kFormat,
-          std::ptrdiff_t{width} * bytes_per_pixel(kFormat), out);
+constexpr SceneFormat scene_format(const char* name, SceneRuns runs) {
+  return {name, kFormat, has_colour(kFormat), runs,
+          [](const std::vector<std::uint8_t>& bgr, int width, int height, std::vector<std::uint8_t>& out) {
+            lay_out({bgr.data(), width, height, std::ptrdiff_t{width} * 3, PixelFormat::kBgr8}, kFormat,
+                    static_cast<std::ptrdiff_t>(row_bytes(kFormat, width)), out);
+          }};
 }
 
 /// Every format of pipeline/frame.hpp. A new one needs a line here and nothing else.
-inline constexpr std::array<SceneFormat, 5> kSceneFormats{
-    {{"bgr8", PixelFormat::kBgr8, true,
+inline constexpr std::array<SceneFormat, kPixelFormats> kSceneFormats{
+    {{"bgr8", PixelFormat::kBgr8, true, SceneRuns::kEach,
       [](const std::vector<std::uint8_t>& bgr, int, int, std::vector<std::uint8_t>& out) { out = bgr; }},
-     {"grey8", PixelFormat::kGrey8, false,
+     {"grey8", PixelFormat::kGrey8, false, SceneRuns::kEach,
       [](const std::vector<std::uint8_t>& bgr, int width, int height, std::vector<std::uint8_t>& out) {
         out.resize(static_cast<std::size_t>(width) * height);
         for (std::size_t i = 0; i < out.size(); ++i) {
           out[i] = static_cast<std::uint8_t>((bgr[3 * i] + 2 * bgr[3 * i + 1] + bgr[3 * i + 2] + 2) / 4);
         }
       }},
-     {"yuyv", PixelFormat::kYuyv, true, pack_as<PixelFormat::kYuyv>},
-     {"uyvy", PixelFormat::kUyvy, true, pack_as<PixelFormat::kUyvy>},
-     {"nv12", PixelFormat::kNv12, true, pack_as<PixelFormat::kNv12>}}};
+     scene_format<PixelFormat::kYuyv>("yuyv", SceneRuns::kEach),
+     scene_format<PixelFormat::kUyvy>("uyvy", SceneRuns::kEach),
+     scene_format<PixelFormat::kNv12>("nv12", SceneRuns::kEach),
+     scene_format<PixelFormat::kGrey10>("grey10", SceneRuns::kNone),
+     scene_format<PixelFormat::kGrey12>("grey12", SceneRuns::kNone),
+     scene_format<PixelFormat::kGrey16>("grey16", SceneRuns::kOne),
+     scene_format<PixelFormat::kGrey10Packed>("grey10p", SceneRuns::kOne),
+     scene_format<PixelFormat::kGrey12Packed>("grey12p", SceneRuns::kNone),
+     scene_format<PixelFormat::kRgb8>("rgb8", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerRggb8>("rggb8", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerGrbg8>("grbg8", SceneRuns::kOne),
+     scene_format<PixelFormat::kBayerGbrg8>("gbrg8", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerBggr8>("bggr8", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerRggb10>("rggb10", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerGrbg10>("grbg10", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerGbrg10>("gbrg10", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerBggr10>("bggr10", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerRggb10Packed>("rggb10p", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerGrbg10Packed>("grbg10p", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerGbrg10Packed>("gbrg10p", SceneRuns::kNone),
+     scene_format<PixelFormat::kBayerBggr10Packed>("bggr10p", SceneRuns::kOne)}};
 
 /// Textured boards before a textured wall, 160 x 120 px, two ideal cameras: integer shifts of noise, microseconds a
 /// pair. From frame 41 on one board goes to and fro, stops (frame 301), leaves (361); from 401 three boards cross each
@@ -161,7 +186,8 @@ class MovingScene {
   }
 
   [[nodiscard]] Picture packed(const std::vector<std::uint8_t>& pixels) const {
-    return {pixels.data(), kWidth, kHeight, std::ptrdiff_t{kWidth} * bytes_per_pixel(format_.format), format_.format};
+    const auto stride = static_cast<std::ptrdiff_t>(row_bytes(format_.format, kWidth));
+    return {pixels.data(), kWidth, kHeight, stride, format_.format};
   }
 
   const SceneFormat& format_;

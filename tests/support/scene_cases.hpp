@@ -29,15 +29,21 @@ struct SceneCase {
 };
 inline void PrintTo(const SceneCase& one, std::ostream* out) { *out << one.name(); }
 
-/// Each preset, source format and way of matching.
-[[nodiscard]] inline std::vector<SceneCase> scene_cases() {
+/// Each preset, source format and way of matching; formats that differ from others in ingest alone once, and some of
+/// them only for who wants every format.
+[[nodiscard]] inline std::vector<SceneCase> scene_cases(bool every_format = false) {
   std::vector<SceneCase> cases;
   for (const char* preset : {"robust", "thesis"}) {
     for (const SceneFormat& format : kSceneFormats) {
+      if (format.runs != SceneRuns::kEach) continue;
       for (const SceneMatching matching : {SceneMatching::kMono, SceneMatching::kRegions, SceneMatching::kDense}) {
         cases.push_back({preset, &format, matching});
       }
     }
+  }
+  for (const SceneFormat& format : kSceneFormats) {
+    const bool once = format.runs == SceneRuns::kOne || (every_format && format.runs == SceneRuns::kNone);
+    if (once) cases.push_back({"robust", &format, SceneMatching::kRegions});
   }
   return cases;
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <iterator>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -28,17 +29,17 @@ struct Owned {
 
 Owned empty_picture(int width, int height, PixelFormat format, int padding = 0) {
   Owned made;
-  const int stride = width * bytes_per_pixel(format) + padding;
+  const int stride = static_cast<int>(row_bytes(format, width)) + padding;
   made.bytes.assign(static_cast<std::size_t>(stride) * static_cast<std::size_t>(memory_rows(format, height)), 128);
   made.picture = {made.bytes.data(), width, height, stride, format};
   return made;
 }
 
-Pipeline::Setup setup_of(int width, int height, const StereoCalibration* calibration = nullptr) {
+Pipeline::Setup setup_of(int width, int height, const StereoCalibration* calibration = nullptr, bool colour = true) {
   Pipeline::Setup setup;
   setup.width = width;
   setup.height = height;
-  setup.colour = true;
+  setup.colour = colour;
   setup.calibration = calibration;
   return setup;
 }
@@ -59,35 +60,58 @@ Owned converted(const Picture& bgr, PixelFormat format) {
 /// The targets believed in and measured, frame by frame.
 using Targets = std::vector<std::vector<TrackReport> >;
 
-Targets targets_of(PixelFormat format) {
+/// The scene in one format as its pipeline sees it.
+class Run {
+ public:
+  Run(PixelFormat format, const StereoCalibration& calibration) : format_(format) {
+    Result<Pipeline> made = Pipeline::create({}, setup_of(kWidth, kHeight, &calibration, has_colour(format)), arena_);
+    EXPECT_TRUE(made.has_value());
+    if (made.has_value()) pipeline_.emplace(*made);
+  }
+
+  void step(FramePair pair) {
+    std::optional<Owned> left;
+    std::optional<Owned> right;
+    if (format_ != PixelFormat::kBgr8) {
+      left = converted(pair.left, format_);
+      right = converted(pair.right, format_);
+      pair.left = left->picture;
+      pair.right = right->picture;
+    }
+    ASSERT_TRUE(pipeline_.has_value());
+    const Result<FrameResult> result = pipeline_->run(pair);
+    ASSERT_TRUE(result.has_value());
+    EXPECT_EQ((result->flags & kFlagNoColour) == 0, has_colour(format_));
+    std::vector<TrackReport>& targets = found_.emplace_back();
+    std::copy_if(result->tracks.begin(), result->tracks.end(), std::back_inserter(targets),
+                 [](const TrackReport& track) { return track.state == TrackState::kConfirmed && track.measured; });
+  }
+
+  [[nodiscard]] const Targets& found() const { return found_; }
+
+ private:
+  PixelFormat format_;
+  Arena arena_;
+  std::optional<Pipeline> pipeline_;
+  Targets found_;
+};
+
+/// In each of these formats; the scene, which takes longer to draw than to track, is drawn once.
+std::vector<Targets> targets_of(const std::vector<PixelFormat>& formats) {
   capture::SyntheticOptions options;
   options.width = kWidth;
   options.height = kHeight;
   options.frames = kFrames;
   const auto source = capture::open_synthetic("eleven", options);
   const StereoCalibration calibration = source->calibration();
-  Arena arena;
-  Result<Pipeline> pipeline = Pipeline::create({}, setup_of(kWidth, kHeight, &calibration), arena);
-  EXPECT_TRUE(pipeline.has_value());
-  Targets found;
+  std::vector<std::unique_ptr<Run> > runs;
+  for (const PixelFormat format : formats) runs.push_back(std::make_unique<Run>(format, calibration));
   FramePair pair;
   while (source->next(pair) == capture::Next::kPair) {
-    std::optional<Owned> left;
-    std::optional<Owned> right;
-    if (format != PixelFormat::kBgr8) {
-      left = converted(pair.left, format);
-      right = converted(pair.right, format);
-      pair.left = left->picture;
-      pair.right = right->picture;
-    }
-    const Result<FrameResult> result = pipeline->run(pair);
-    EXPECT_TRUE(result.has_value());
-    if (!result.has_value()) return found;
-    EXPECT_EQ(result->flags & kFlagNoColour, 0U);
-    std::vector<TrackReport>& targets = found.emplace_back();
-    std::copy_if(result->tracks.begin(), result->tracks.end(), std::back_inserter(targets),
-                 [](const TrackReport& track) { return track.state == TrackState::kConfirmed && track.measured; });
+    for (const auto& run : runs) run->step(pair);
   }
+  std::vector<Targets> found;
+  for (const auto& run : runs) found.push_back(run->found());
   return found;
 }
 
@@ -138,33 +162,62 @@ Agreement agreement_of(const Targets& one, const Targets& other) {
   return sum;
 }
 
-// Luma is the same to the bit; chroma is shared by two or four pixels, which moves the borders of what differs from its
-// background by colour. Nine in ten must be the same; measured are 98 % with kYuyv, 93 % with kNv12.
-TEST(PixelFormats, TargetsAreTheSameFromPackedPicturesAsFromBgr) {
-  const Targets bgr = targets_of(PixelFormat::kBgr8);
-  ASSERT_EQ(bgr.size(), static_cast<std::size_t>(kFrames));
-  for (const PixelFormat format : {PixelFormat::kYuyv, PixelFormat::kNv12}) {
-    const Targets packed = targets_of(format);
-    ASSERT_EQ(packed.size(), bgr.size());
-    for (const Agreement& agreement : {agreement_of(bgr, packed), agreement_of(packed, bgr)}) {
-      EXPECT_GT(agreement.targets, 300);
-      EXPECT_GE(agreement.same * 10, agreement.targets * 9) << static_cast<int>(format);
-      EXPECT_GE(agreement.overlap, 0.95) << static_cast<int>(format);
-      EXPECT_LE(agreement.apart, 0.005) << static_cast<int>(format);
-    }
+// How much of what one format finds another must find, too.
+struct Demand {
+  double same = 1;     ///< of the targets
+  double overlap = 1;  ///< of their boxes, at least
+  double apart = 0;    ///< of their positions, at most
+};
+
+void expect_agreement(const Targets& one, const Targets& other, const Demand& demand) {
+  ASSERT_EQ(one.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(other.size(), one.size());
+  for (const Agreement& agreement : {agreement_of(one, other), agreement_of(other, one)}) {
+    EXPECT_GT(agreement.targets, 300);
+    EXPECT_GE(agreement.same, demand.same * agreement.targets);
+    EXPECT_GE(agreement.overlap, demand.overlap);
+    EXPECT_LE(agreement.apart, demand.apart);
   }
 }
 
-// The same bytes in another order.
-TEST(PixelFormats, UyvyIsYuyvInAnotherOrder) {
-  const Targets yuyv = targets_of(PixelFormat::kYuyv);
-  const Targets uyvy = targets_of(PixelFormat::kUyvy);
-  ASSERT_EQ(yuyv.size(), uyvy.size());
-  const Agreement agreement = agreement_of(yuyv, uyvy);
-  EXPECT_GT(agreement.targets, 300);
-  EXPECT_EQ(agreement.same, agreement.targets);
-  EXPECT_EQ(agreement.overlap, 1);
-  EXPECT_EQ(agreement.apart, 0);
+// Luma is the same to the bit; chroma is shared by two or four pixels, which moves the borders of what differs from its
+// background by colour. Nine in ten must be the same; measured are 98 % with kYuyv, 93 % with kNv12. The others are the
+// same bytes in another order.
+TEST(PixelFormats, TargetsAreTheSameFromPackedPicturesAsFromBgr) {
+  const std::vector<Targets> found =
+      targets_of({PixelFormat::kBgr8, PixelFormat::kYuyv, PixelFormat::kNv12, PixelFormat::kUyvy, PixelFormat::kRgb8});
+  for (const std::size_t packed : {1U, 2U}) {
+    SCOPED_TRACE(packed);
+    expect_agreement(found[0], found[packed], {.same = 0.9, .overlap = 0.95, .apart = 0.005});
+  }
+  expect_agreement(found[1], found[3], {});
+  expect_agreement(found[0], found[4], {});
+}
+
+// What the bits below the 8 most significant hold is of no consequence, and where they lie neither.
+TEST(PixelFormats, TargetsAreTheSameFromGreyOfMoreBitsAsFromEight) {
+  const std::vector<Targets> found =
+      targets_of({PixelFormat::kGrey8, PixelFormat::kGrey10, PixelFormat::kGrey12, PixelFormat::kGrey16,
+                  PixelFormat::kGrey10Packed, PixelFormat::kGrey12Packed});
+  for (std::size_t other = 1; other < found.size(); ++other) {
+    SCOPED_TRACE(other);
+    expect_agreement(found[0], found[other], {});
+  }
+}
+
+// A mosaic has a quarter of the samples of red and of blue, half of those of green, and what lies between them is made
+// up: the finest texture is lost, and edges move by a pixel. Measured, with the four patterns: 87 to 96 % the same,
+// their boxes by 0.87, their places by 0.9 to 6.5 % of the distance. That of ten bits is the same to the bit.
+TEST(PixelFormats, TargetsAreTheSameFromMosaicsAsFromBgr) {
+  const std::vector<Targets> found =
+      targets_of({PixelFormat::kBgr8, PixelFormat::kBayerRggb8, PixelFormat::kBayerGrbg8, PixelFormat::kBayerGbrg8,
+                  PixelFormat::kBayerBggr8, PixelFormat::kBayerGrbg10, PixelFormat::kBayerBggr10Packed});
+  for (std::size_t mosaic = 1; mosaic <= 4; ++mosaic) {
+    SCOPED_TRACE(mosaic);
+    expect_agreement(found[0], found[mosaic], {.same = 0.8, .overlap = 0.85, .apart = 0.08});
+  }
+  expect_agreement(found[2], found[5], {});
+  expect_agreement(found[4], found[6], {});
 }
 
 TEST(PixelFormats, GreyPicturesWhereColourWasAnnouncedAreAFault) {
@@ -188,6 +241,7 @@ TEST(PixelFormats, SizesThatAFormatCannotHaveAreAFault) {
     return result.error();
   };
   EXPECT_EQ(fault_of(33, 17, PixelFormat::kBgr8), std::nullopt);
+  EXPECT_EQ(fault_of(33, 17, PixelFormat::kRgb8), std::nullopt);
   EXPECT_EQ(fault_of(32, 17, PixelFormat::kYuyv), std::nullopt);
   EXPECT_EQ(fault_of(32, 17, PixelFormat::kUyvy), std::nullopt);
   EXPECT_EQ(fault_of(32, 18, PixelFormat::kNv12), std::nullopt);
@@ -195,6 +249,25 @@ TEST(PixelFormats, SizesThatAFormatCannotHaveAreAFault) {
   EXPECT_EQ(fault_of(33, 17, PixelFormat::kUyvy), Fault::kBadSize);
   EXPECT_EQ(fault_of(33, 18, PixelFormat::kNv12), Fault::kBadSize);
   EXPECT_EQ(fault_of(32, 17, PixelFormat::kNv12), Fault::kBadSize);
+  for (int i = static_cast<int>(PixelFormat::kBayerRggb8); i < kPixelFormats; ++i) {
+    const auto format = static_cast<PixelFormat>(i);
+    const bool in_fours = format >= PixelFormat::kBayerRggb10Packed;
+    EXPECT_EQ(fault_of(36, 18, format), std::nullopt) << i;
+    EXPECT_EQ(fault_of(34, 18, format), in_fours ? std::optional(Fault::kBadSize) : std::nullopt) << i;
+    EXPECT_EQ(fault_of(33, 18, format), Fault::kBadSize) << i;
+    EXPECT_EQ(fault_of(36, 17, format), Fault::kBadSize) << i;
+  }
+}
+
+TEST(PixelFormats, GreySizesThatAFormatCannotHaveAreAFault) {
+  const auto fits = [](int width, PixelFormat format) { return fits_format(format, width, 17); };
+  for (const PixelFormat format : {PixelFormat::kGrey10, PixelFormat::kGrey12, PixelFormat::kGrey16}) {
+    EXPECT_TRUE(fits(33, format)) << static_cast<int>(format);
+  }
+  EXPECT_TRUE(fits(36, PixelFormat::kGrey10Packed));
+  EXPECT_FALSE(fits(34, PixelFormat::kGrey10Packed));
+  EXPECT_TRUE(fits(34, PixelFormat::kGrey12Packed));
+  EXPECT_FALSE(fits(33, PixelFormat::kGrey12Packed));
 }
 
 }  // namespace

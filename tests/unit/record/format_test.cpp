@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
 #include <stdexcept>
 
 #include "drivers/record/calibration_text.hpp"
@@ -41,6 +42,19 @@ TEST(RecordFormat, AboutReadsBackAsItWas) {
   EXPECT_EQ(read.cause, "deadline-gpio");
 }
 
+TEST(RecordFormat, EachPixelFormatHasANameOfItsOwn) {
+  std::set<std::string> texts;
+  for (int i = 0; i < kPixelFormats; ++i) {
+    About about;
+    about.width = about.height = 4;
+    about.format = static_cast<PixelFormat>(i);
+    const std::string text = to_text(about);
+    EXPECT_EQ(about_from_text(text, "x.strec").format, about.format) << text;
+    texts.insert(text);
+  }
+  EXPECT_EQ(texts.size(), std::size_t{kPixelFormats});
+}
+
 TEST(RecordFormat, WhatIsMissingOrWrongIsOneLineWithTheKey) {
   About about;
   about.width = about.height = 4;
@@ -53,8 +67,11 @@ TEST(RecordFormat, WhatIsMissingOrWrongIsOneLineWithTheKey) {
 }
 
 TEST(RecordFormat, SizesThatAreNoPicturesAreRefused) {
-  for (const auto& [width, height, format] :
-       {std::tuple{0, 4, PixelFormat::kGrey8}, {4, 100000, PixelFormat::kGrey8}, {5, 4, PixelFormat::kYuyv}}) {
+  for (const auto& [width, height, format] : {std::tuple{0, 4, PixelFormat::kGrey8},
+                                              {4, 100000, PixelFormat::kGrey8},
+                                              {5, 4, PixelFormat::kYuyv},
+                                              {6, 4, PixelFormat::kGrey10Packed},
+                                              {4, 5, PixelFormat::kBayerRggb8}}) {
     About about;
     about.width = width;
     about.height = height;

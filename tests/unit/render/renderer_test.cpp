@@ -14,10 +14,13 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "firmware-app/render/painter.hpp"
 #include "firmware-app/render/style.hpp"
+#include "pipeline/photometry/colour.hpp"
 #include "scene.hpp"
+#include "tests/support/pixel_layouts.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace stereotrack::render {
@@ -272,6 +275,26 @@ TEST(Painter, ColourPictureKeepsItsColoursAndAnEmptyOneIsDrawn) {
   EXPECT_EQ(painter.draw(pair, {}).at<cv::Vec3b>(300, 300), cv::Vec3b(10, 20, 200));
   pair.left = {};
   EXPECT_NE(painter.draw(pair, {}).at<cv::Vec3b>(300, 300), cv::Vec3b(10, 20, 200));
+}
+
+// One colour all over in each format: where a format has colour, that colour is drawn, else its luma. Not the YUV ones:
+// OpenCV takes them to be of limited range.
+TEST(Painter, EachFormatIsDrawnInItsOwnColour) {
+  const cv::Vec3b colour(30, 90, 200);
+  const cv::Mat bgr(16, 16, CV_8UC3, cv::Scalar(colour));
+  const Picture whole{bgr.data, 16, 16, static_cast<std::ptrdiff_t>(bgr.step), PixelFormat::kBgr8};
+  Painter painter(16, 16, nullptr, {});
+  for (int i = static_cast<int>(PixelFormat::kGrey10); i < kPixelFormats; ++i) {
+    const auto format = static_cast<PixelFormat>(i);
+    const auto stride = static_cast<std::ptrdiff_t>(row_bytes(format, 16)) + 3;
+    std::vector<std::uint8_t> pixels;
+    test::lay_out(whole, format, stride, pixels);
+    FramePair pair;
+    pair.left = {pixels.data(), 16, 16, stride, format};
+    const std::uint8_t grey = luma(colour[0], colour[1], colour[2]);
+    EXPECT_EQ(painter.draw(pair, {}).at<cv::Vec3b>(300, 300), has_colour(format) ? colour : cv::Vec3b(grey, grey, grey))
+        << i;
+  }
 }
 
 TEST(MakeRenderer, SourceWithoutASizeIsRefused) {
