@@ -18,6 +18,7 @@ real: the host's clock, a host thread a core.
 """
 import argparse
 import ctypes
+import fcntl
 import hashlib
 import json
 import os
@@ -58,27 +59,30 @@ def die_with_parent():
     ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
 
 
+def machine_options(clock, folder, disk, payload, forgetful):
+    """Of the emulator: a board with its files in `folder`. forgetful: what it writes to `disk` is not kept."""
+    return [
+        "-M", "virt", "-cpu", "cortex-a72", *CLOCKS[clock], "-smp", "2", "-m", "1024",
+        "-nodefaults", "-nographic", "-no-reboot", "-monitor", "none", "-serial", f"file:{folder}/console.log",
+        "-qmp", f"unix:{folder}/qmp,server=on,wait=off",
+        "-kernel", str(CACHE / "vmlinuz"), "-initrd", str(CACHE / "initrd.gz"),
+        "-append", "console=ttyAMA0 loglevel=4 panic=1 systemd.show_status=0",
+        "-drive", f"file={disk},if=none,id=root,format=qcow2" + (",snapshot=on" if forgetful else ""),
+        "-device", "virtio-blk-pci,drive=root",
+        "-drive", f"file={payload},if=none,id=payload,format=raw,readonly=on",
+        "-device", "virtio-blk-pci,drive=payload", "-device", "virtio-rng-pci", "-device", "virtio-serial-pci",
+        "-chardev", "stdio,id=control,signal=off", "-device", "virtserialport,chardev=control,name=board.control",
+        "-chardev", f"file,id=files,path={folder}/files.tar", "-device", "virtserialport,chardev=files,name=board.files"]
+
+
 class Machine:
     """A running emulator. Its control port is its standard input and output; lines of "board: " are the agent's."""
 
     def __init__(self, folder, clock, disk, payload, extra):
         self.console = folder / "console.log"
-        self.files = folder / "files.tar"
         self.qmp = folder / "qmp"
         self.buffer = b""
-        command = [
-            "qemu-system-aarch64", "-M", "virt", "-cpu", "cortex-a72", *CLOCKS[clock], "-smp", "2", "-m", "1024",
-            "-nodefaults", "-nographic", "-no-reboot", "-monitor", "none", "-serial", f"file:{self.console}",
-            "-qmp", f"unix:{self.qmp},server=on,wait=off",
-            "-kernel", str(CACHE / "vmlinuz"), "-initrd", str(CACHE / "initrd.gz"),
-            "-append", "console=ttyAMA0 loglevel=4 panic=1 systemd.show_status=0",
-            "-drive", f"file={disk},if=none,id=root,format=qcow2" + (",snapshot=on" if extra else ""),
-            "-device", "virtio-blk-pci,drive=root",
-            "-drive", f"file={payload},if=none,id=payload,format=raw,readonly=on",
-            "-device", "virtio-blk-pci,drive=payload", "-device", "virtio-rng-pci", "-device", "virtio-serial-pci",
-            "-chardev", "stdio,id=control,signal=off", "-device", "virtserialport,chardev=control,name=board.control",
-            "-chardev", f"file,id=files,path={self.files}", "-device", "virtserialport,chardev=files,name=board.files",
-            *extra]
+        command = ["qemu-system-aarch64", *machine_options(clock, folder, disk, payload, bool(extra)), *extra]
         environment = {**os.environ, "TMPDIR": str(folder)}
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment,
                                         preexec_fn=die_with_parent)
@@ -143,10 +147,17 @@ class Machine:
 def make(clock):
     """Image and saved state; (disk, state) to start from."""
     CACHE.mkdir(parents=True, exist_ok=True)
+    # One maker at a time. The lock goes with its file object.
+    with open(CACHE / "saved.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return make_alone(clock)
+
+
+def make_alone(clock):
     subprocess.run([HERE / "make_image.sh", CACHE], check=True, stdout=sys.stderr)
-    version = subprocess.run(["qemu-system-aarch64", "--version"], check=True, capture_output=True).stdout
-    key = hashlib.sha256(b"\0".join([(CACHE / "id").read_bytes(), version, pathlib.Path(__file__).read_bytes()]))
-    folder = CACHE / f"saved-{clock}-{key.hexdigest()[:16]}"
+    version = subprocess.run(["qemu-system-aarch64", "--version"], check=True, capture_output=True, text=True).stdout
+    key = " ".join([(CACHE / "id").read_text(), version, *map(str, machine_options(clock, "", "", "", True)), str(PAYLOAD_SIZE)])
+    folder = CACHE / f"saved-{clock}-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     disk, state = folder / "disk.qcow2", folder / "state"
     if folder.exists():
         return disk, state
