@@ -8,6 +8,13 @@
       --results FOLDER               what the program left in /run/results
       --time-limit SECONDS           of the board's clock (60): then it says what hangs, exit code 124
       --clock steady|real            default steady
+  board.py test [--build FOLDER] [--junit FILE] [GROUP|GROUP/CASE]...
+                                                       the cases (all), each on a fresh board; exit code 1 where one
+                                                       fails or there is none; what they left: build/board-results
+  board.py targets [GROUP|GROUP/CASE]...               the CMake targets that the cases want
+
+A case is cases/GROUP/CASE.sh. It prints TAP (guest/tap.sh) and says in its head, in comments: "# wants: bin/PROGRAM ..."
+what it wants of the build folder, "# limit: SECONDS" of the board's clock (120).
 
 Everything lies in build/board, or where STEREOTRACK_BOARD_CACHE says. The board is booted once and its state is saved;
 each run starts from there, in seconds, on disks that forget. No board outlives board.py.
@@ -23,6 +30,7 @@ import hashlib
 import json
 import os
 import pathlib
+import re
 import select
 import shlex
 import shutil
@@ -33,9 +41,11 @@ import sys
 import tarfile
 import tempfile
 import time
+import xml.etree.ElementTree as xml
 
 HERE = pathlib.Path(__file__).resolve().parent
-CACHE = pathlib.Path(os.environ.get("STEREOTRACK_BOARD_CACHE") or HERE.parents[2] / "build/board").resolve()
+PROJECT = HERE.parents[2]
+CACHE = pathlib.Path(os.environ.get("STEREOTRACK_BOARD_CACHE") or PROJECT / "build/board").resolve()
 CLOCKS = {"steady": ["-accel", "tcg,thread=single", "-icount", "shift=1,sleep=off"], "real": ["-accel", "tcg,thread=multi"]}
 # The saved state knows the size of the disk that it will find.
 PAYLOAD_SIZE = 2 << 30
@@ -256,6 +266,99 @@ def command_run(args):
     return run(args.clock, things, start, args.time_limit, args.results, lambda line: print(line, flush=True))
 
 
+class Case:
+    """One script of cases/: what it wants, and what it said."""
+
+    def __init__(self, path):
+        self.path = path
+        self.name = f"{path.parent.name}/{path.stem}"
+        head = path.read_text()
+        self.wants = [name for line in re.findall(r"^# wants: (.*)$", head, re.M) for name in line.split()]
+        self.limit = int((re.findall(r"^# limit: (\d+)$", head, re.M) or [120])[0])
+        self.facts = []  # (name, "ok" | "not ok" | "skip", text)
+        self.comments = []
+        self.plan = None
+
+    def hear(self, line):
+        """A line of TAP; what is none of its kinds is told with the next fact."""
+        print(f"  {line}", flush=True)
+        if match := re.fullmatch(r"(ok|not ok) \d+ - (.*?)(?: # SKIP ?(.*))?", line):
+            kind, name, skipped = match.groups()
+            text = "\n".join(self.comments) if skipped is None else f"skipped: {skipped or 'no reason given'}"
+            self.facts.append((name, kind if skipped is None else "skip", text))
+            self.comments = []
+        elif match := re.fullmatch(r"1\.\.(\d+)", line):
+            self.plan = int(match[1])
+        else:
+            self.comments.append(line.removeprefix("# "))
+
+    def fail(self, name):
+        self.facts.append((name, "not ok", "\n".join(self.comments)))
+
+    def finish(self, code):
+        if code == HUNG:
+            self.fail(f"is done within {self.limit} s")
+        elif self.plan is None or code:
+            self.fail(f"goes through to its end (code {code})")
+        elif self.plan != len(self.facts):
+            self.fail(f"has {self.plan} facts as it says, not {len(self.facts)}")
+
+
+def cases_of(names):
+    found = [Case(path) for path in sorted((HERE / "cases").glob("*/*.sh"))]
+    groups = {case.path.parent.name for case in found}
+    for name in names:
+        if name not in groups and name not in {case.name for case in found}:
+            raise BoardError(f"no such group or case: {name}; groups are {', '.join(sorted(groups))}")
+    return [case for case in found if not names or case.name in names or case.path.parent.name in names]
+
+
+def write_junit(cases, path):
+    """In the form of ctest's, so that tests/lint/report_tests.py reads it."""
+    root = xml.Element("testsuite", name="board")
+    for case in cases:
+        for name, kind, text in case.facts:
+            status = {"ok": "run", "not ok": "fail", "skip": "notrun"}[kind]
+            entry = xml.SubElement(root, "testcase", name=f"{case.name}: {name}", classname=case.name, status=status)
+            if kind == "not ok":
+                xml.SubElement(entry, "failure", message="")
+            elif kind == "skip":
+                xml.SubElement(entry, "skipped", message="")
+            # XML has no control characters.
+            xml.SubElement(entry, "system-out").text = re.sub(r"[\x00-\x08\x0b-\x1f]", "?", text)
+    pathlib.Path(path).write_bytes(xml.tostring(root))
+
+
+def command_test(args):
+    cases = cases_of(args.names)
+    build = pathlib.Path(args.build)
+    results = PROJECT / "build/board-results"
+    shutil.rmtree(results, ignore_errors=True)
+    for case in cases:
+        print(f"{case.name}", flush=True)
+        things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh"}
+        things.update({pathlib.Path(want).name: build / want for want in case.wants})
+        try:
+            case.finish(run(args.clock, things, f"limited {case.limit} {case.name} bash case.sh", case.limit,
+                            results / case.name, case.hear))
+        except BoardError as error:
+            case.comments += str(error).splitlines()
+            print(f"  {error}")
+            case.fail("comes to an end on the board")
+    write_junit(cases, args.junit)
+    for case in cases:
+        for name, kind, _ in case.facts:
+            if kind == "not ok":
+                print(f"FAILED {case.name}: {name}")
+    report = [PROJECT / "tests/lint/report_tests.py", args.junit, PROJECT / "tests/expected_skips.txt"]
+    return subprocess.run(report, check=False).returncode
+
+
+def command_targets(args):
+    print(*sorted({pathlib.Path(want).name for case in cases_of(args.names) for want in case.wants}))
+    return 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -268,6 +371,12 @@ def main():
     one.add_argument("--time-limit", type=int, default=60, metavar="SECONDS")
     one.add_argument("program")
     one.add_argument("arguments", nargs=argparse.REMAINDER)
+    several = argparse.ArgumentParser(add_help=False)
+    several.add_argument("names", nargs="*", metavar="GROUP|GROUP/CASE")
+    test = commands.add_parser("test", parents=[with_clock, several])
+    test.add_argument("--build", default=PROJECT / "build/aarch64-board", metavar="FOLDER")
+    test.add_argument("--junit", default=PROJECT / "build/board.xml", metavar="FILE")
+    commands.add_parser("targets", parents=[several])
     args = parser.parse_args()
     # A finally of ours ends the emulator.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
@@ -275,7 +384,7 @@ def main():
         if args.command == "make":
             make(args.clock)
             return 0
-        return command_run(args)
+        return {"run": command_run, "test": command_test, "targets": command_targets}[args.command](args)
     except BoardError as error:
         note(error)
         return 1

@@ -15,7 +15,7 @@ source "$here/../../../toolchains/arm64_packages.sh"
 
 packages=(base-files base-passwd bash dash coreutils util-linux mount sed grep gawk findutils tar gzip login libc-bin
   init-system-helpers libpam-modules libpam-runtime systemd systemd-sysv udev kmod dbus procps iproute2 strace
-  v4l-utils gpiod libcamera-tools libcamera-ipa curl python3-minimal
+  v4l-utils gpiod libcamera-tools libcamera-ipa curl
   # What our programs are linked with.
   libgpiod2 libstdc++6 libhwy1 libsodium23 libsystemd0 libyaml-cpp0.7 libcpp-httplib0.11
   libopencv-core406 libopencv-imgproc406 libopencv-calib3d406 libopencv-imgcodecs406 libopencv-videoio406)
@@ -42,7 +42,7 @@ flock 9
 
 kernel_stamp=$(cat "$here/make_kernel.sh" "$here"/modules/* | hash_of)
 tree_stamp=$(echo "${packages[*]}" | cat - "$here/../../../toolchains/arm64_packages.sh" | hash_of)
-image_stamp=$(echo "$kernel_stamp $tree_stamp" | cat - "$here/make_image.sh" "$here"/guest/* | hash_of)
+image_stamp=$(echo "$kernel_stamp $tree_stamp" | cat - "$here/make_image.sh" "$here"/guest/{agent,devices,board-agent.service} | hash_of)
 
 if ! is_made kernel "$kernel_stamp"; then
   rm -f "$folder/kernel.stamp"

@@ -16,21 +16,21 @@ static struct platform_device *vimc_pdevs[8];
 
 static int __init vimc_init(void)
 {
-	unsigned int i;
+    unsigned int i;
 
-	for (i = 0; i < n_devs && i < ARRAY_SIZE(vimc_pdevs); i++)
-		vimc_pdevs[i] = platform_device_register_simple(VIMC_PDEV_NAME, i, NULL, 0);
-	return platform_driver_register(&vimc_pdrv);
+    for (i = 0; i < n_devs && i < ARRAY_SIZE(vimc_pdevs); i++)
+        vimc_pdevs[i] = platform_device_register_simple(VIMC_PDEV_NAME, i, NULL, 0);
+    return platform_driver_register(&vimc_pdrv);
 }
 
 static void __exit vimc_exit(void)
 {
-	unsigned int i;
+    unsigned int i;
 
-	platform_driver_unregister(&vimc_pdrv);
-	for (i = 0; i < ARRAY_SIZE(vimc_pdevs); i++)
-		if (!IS_ERR_OR_NULL(vimc_pdevs[i]))
-			platform_device_unregister(vimc_pdevs[i]);
+    platform_driver_unregister(&vimc_pdrv);
+    for (i = 0; i < ARRAY_SIZE(vimc_pdevs); i++)
+        if (!IS_ERR_OR_NULL(vimc_pdevs[i]))
+            platform_device_unregister(vimc_pdevs[i]);
 }
 
 """
