@@ -24,6 +24,7 @@ between frames are 40 ms however busy the host is. What waits for a disk sees ti
 real: the host's clock, a host thread a core.
 """
 import argparse
+import contextlib
 import ctypes
 import fcntl
 import hashlib
@@ -57,6 +58,10 @@ HUNG = 124
 
 class BoardError(Exception):
     """One line that says what is wrong."""
+
+
+class UsageError(BoardError):
+    """The same, of what was asked for."""
 
 
 def note(text):
@@ -125,7 +130,7 @@ class Machine:
 
     def console_tail(self):
         text = self.console.read_text(errors="replace") if self.console.exists() else ""
-        return "\n".join(text.splitlines()[-25:]) or "(nothing)"
+        return "\n".join(text.splitlines()[-60:]) or "(nothing)"
 
     def ask(self, connection, command, **arguments):
         """One QMP command's answer; events are passed over."""
@@ -163,7 +168,29 @@ def make(clock):
         return make_alone(clock)
 
 
+def sweep():
+    """Removes what runs left that were killed. Who is alive has a lock on its folder, or made it just now."""
+    for folder in [*CACHE.glob("run-*"), *CACHE.glob("saving-*")]:
+        try:
+            if time.time() - folder.stat().st_mtime > 60:
+                with locked(folder, fcntl.LOCK_NB):
+                    shutil.rmtree(folder)
+        except OSError:
+            pass
+
+
+@contextlib.contextmanager
+def locked(folder, how=0):
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | how)
+        yield
+    finally:
+        os.close(handle)
+
+
 def make_alone(clock):
+    sweep()
     subprocess.run([HERE / "make_image.sh", CACHE], check=True, stdout=sys.stderr)
     version = subprocess.run(["qemu-system-aarch64", "--version"], check=True, capture_output=True, text=True).stdout
     key = " ".join([(CACHE / "id").read_text(), version, *map(str, machine_options(clock, "", "", "", True)), str(PAYLOAD_SIZE)])
@@ -209,7 +236,7 @@ def add(source, target):
     """A link where it can be, else a copy."""
     source = pathlib.Path(source)
     if not source.exists():
-        raise BoardError(f"{source}: no such file")
+        raise UsageError(f"{source}: no such file")
     if source.is_dir():
         shutil.copytree(source, target, dirs_exist_ok=True)
         return
@@ -221,7 +248,7 @@ def run(clock, things, start, time_limit, results, hear):
     """Runs the script `start` on a board with the things (name in /payload -> path here). hear(line) is told each line
     of its output. Its exit code. Raises BoardError where no exit code comes."""
     disk, state = make(clock)
-    with tempfile.TemporaryDirectory(dir=CACHE, prefix="run-") as name:
+    with tempfile.TemporaryDirectory(dir=CACHE, prefix="run-") as name, locked(name):
         work = pathlib.Path(name)
         tree = work / "payload"
         for inside, path in things.items():
@@ -309,7 +336,7 @@ def cases_of(names):
     groups = {case.path.parent.name for case in found}
     for name in names:
         if name not in groups and name not in {case.name for case in found}:
-            raise BoardError(f"no such group or case: {name}; groups are {', '.join(sorted(groups))}")
+            raise UsageError(f"no such group or case: {name}; groups are {', '.join(sorted(groups))}")
     return [case for case in found if not names or case.name in names or case.path.parent.name in names]
 
 
@@ -387,7 +414,7 @@ def main():
         return {"run": command_run, "test": command_test, "targets": command_targets}[args.command](args)
     except BoardError as error:
         note(error)
-        return 1
+        return 2 if isinstance(error, UsageError) else 1
     except subprocess.CalledProcessError as error:
         note(f"{error.cmd[0]} failed (code {error.returncode})")
         return 1
