@@ -1,0 +1,424 @@
+#!/usr/bin/env python3
+"""The emulated board: 64-bit ARM, Debian 12, two cameras of the kernel's own (vivid), and more: guest/devices.
+
+    board.py make                                      image and saved state, where they do not fit the scripts
+    board.py run [OPTIONS] PROGRAM [ARGUMENT...]       a program (or script) of the host on a fresh board, as root in
+                                                       /payload; its output and its exit code
+      --with PATH                    a file or folder that comes along; again for more
+      --results FOLDER               what the program left in /run/results
+      --time-limit SECONDS           of the board's clock (60): then it says what hangs, exit code 124
+      --clock steady|real            default steady
+  board.py test [--build FOLDER] [--junit FILE] [GROUP|GROUP/CASE]...
+                                                       the cases (all), each on a fresh board; exit code 1 where one
+                                                       fails or there is none; what they left: build/board-results
+  board.py targets [GROUP|GROUP/CASE]...               the CMake targets that the cases want
+
+A case is cases/GROUP/CASE.sh. It prints TAP (guest/tap.sh) and says in its head, in comments: "# wants: bin/PROGRAM ..."
+what it wants of the build folder, "# limit: SECONDS" of the board's clock (120).
+
+Everything lies in build/board, or where STEREOTRACK_BOARD_CACHE says. The board is booted once and its state is saved;
+each run starts from there, in seconds, on disks that forget. No board outlives board.py.
+
+Clocks. steady: time is the count of instructions, two nanoseconds each on one host thread, and idle time is skipped: 40 ms
+between frames are 40 ms however busy the host is. What waits for a disk sees time leap: read files before it counts.
+real: the host's clock, a host thread a core.
+"""
+import argparse
+import contextlib
+import ctypes
+import fcntl
+import hashlib
+import json
+import os
+import pathlib
+import re
+import select
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import xml.etree.ElementTree as xml
+
+HERE = pathlib.Path(__file__).resolve().parent
+PROJECT = HERE.parents[2]
+CACHE = pathlib.Path(os.environ.get("STEREOTRACK_BOARD_CACHE") or PROJECT / "build/board").resolve()
+CLOCKS = {"steady": ["-accel", "tcg,thread=single", "-icount", "shift=1,sleep=off"], "real": ["-accel", "tcg,thread=multi"]}
+# The saved state knows the size of the disk that it will find.
+PAYLOAD_SIZE = 2 << 30
+BOOT_LIMIT_S = 300
+# Of the host, beyond the time limit of the board's clock: an emulator on a busy host.
+HOST_FACTOR = 10
+HUNG = 124
+
+
+class BoardError(Exception):
+    """One line that says what is wrong."""
+
+
+class UsageError(BoardError):
+    """The same, of what was asked for."""
+
+
+def note(text):
+    print(f"board: {text}", file=sys.stderr, flush=True)
+
+
+def die_with_parent():
+    """In the child: SIGKILL when board.py is gone, however it went."""
+    pr_set_pdeathsig = 1
+    ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+
+
+def machine_options(clock, folder, disk, payload, forgetful):
+    """Of the emulator: a board with its files in `folder`. forgetful: what it writes to `disk` is not kept."""
+    return [
+        "-M", "virt", "-cpu", "cortex-a72", *CLOCKS[clock], "-smp", "2", "-m", "1024",
+        "-nodefaults", "-nographic", "-no-reboot", "-monitor", "none", "-serial", f"file:{folder}/console.log",
+        "-qmp", f"unix:{folder}/qmp,server=on,wait=off",
+        "-kernel", str(CACHE / "vmlinuz"), "-initrd", str(CACHE / "initrd.gz"),
+        "-append", "console=ttyAMA0 loglevel=4 panic=1 systemd.show_status=0",
+        "-drive", f"file={disk},if=none,id=root,format=qcow2" + (",snapshot=on" if forgetful else ""),
+        "-device", "virtio-blk-pci,drive=root",
+        "-drive", f"file={payload},if=none,id=payload,format=raw,readonly=on",
+        "-device", "virtio-blk-pci,drive=payload", "-device", "virtio-rng-pci", "-device", "virtio-serial-pci",
+        "-chardev", "stdio,id=control,signal=off", "-device", "virtserialport,chardev=control,name=board.control",
+        "-chardev", f"file,id=files,path={folder}/files.tar", "-device", "virtserialport,chardev=files,name=board.files"]
+
+
+class Machine:
+    """A running emulator. Its control port is its standard input and output; lines of "board: " are the agent's."""
+
+    def __init__(self, folder, clock, disk, payload, extra):
+        self.console = folder / "console.log"
+        self.qmp = folder / "qmp"
+        self.buffer = b""
+        command = ["qemu-system-aarch64", *machine_options(clock, folder, disk, payload, bool(extra)), *extra]
+        environment = {**os.environ, "TMPDIR": str(folder)}
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment,
+                                        preexec_fn=die_with_parent)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+
+    def say(self, text):
+        self.process.stdin.write(f"{text}\n".encode())
+        self.process.stdin.flush()
+
+    def lines(self, deadline):
+        """Lines of the control port, without their ends; raises BoardError at the deadline (of time.monotonic)."""
+        out = self.process.stdout.fileno()
+        while True:
+            while b"\n" in self.buffer:
+                line, self.buffer = self.buffer.split(b"\n", 1)
+                yield line.decode(errors="replace").rstrip("\r")
+            if not select.select([out], [], [], max(0.0, deadline - time.monotonic()))[0]:
+                raise TimeoutError
+            got = os.read(out, 1 << 16)
+            if not got:
+                raise BoardError(f"the emulator ended by itself (code {self.process.wait()}); the board's console:\n"
+                                 + self.console_tail())
+            self.buffer += got
+
+    def console_tail(self):
+        text = self.console.read_text(errors="replace") if self.console.exists() else ""
+        return "\n".join(text.splitlines()[-60:]) or "(nothing)"
+
+    def ask(self, connection, command, **arguments):
+        """One QMP command's answer; events are passed over."""
+        connection.write(json.dumps({"execute": command, "arguments": arguments}) + "\n")
+        connection.flush()
+        for line in connection:
+            answer = json.loads(line)
+            if "error" in answer:
+                raise BoardError(f"the emulator refuses {command}: {answer['error']['desc']}")
+            if "return" in answer:
+                return answer["return"]
+        raise BoardError(f"the emulator is gone at {command}")
+
+    def save(self, path):
+        """The machine's state into a file; the machine stands still after it."""
+        with socket.socket(socket.AF_UNIX) as plug:
+            plug.connect(str(self.qmp))
+            with plug.makefile("rw") as connection:
+                connection.readline()
+                self.ask(connection, "qmp_capabilities")
+                self.ask(connection, "migrate-set-parameters", **{"max-bandwidth": 4 << 30})
+                self.ask(connection, "migrate", uri=f"exec:cat >{shlex.quote(str(path))}")
+                while (state := self.ask(connection, "query-migrate")["status"]) != "completed":
+                    if state not in ("setup", "active", "device", "pre-switchover"):
+                        raise BoardError(f"saving the board's state: {state}")
+                    time.sleep(0.1)
+
+
+def make(clock):
+    """Image and saved state; (disk, state) to start from."""
+    CACHE.mkdir(parents=True, exist_ok=True)
+    # One maker at a time. The lock goes with its file object.
+    with open(CACHE / "saved.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return make_alone(clock)
+
+
+def sweep():
+    """Removes what runs left that were killed. Who is alive has a lock on its folder, or made it just now."""
+    for folder in [*CACHE.glob("run-*"), *CACHE.glob("saving-*")]:
+        try:
+            if time.time() - folder.stat().st_mtime > 60:
+                with locked(folder, fcntl.LOCK_NB):
+                    shutil.rmtree(folder)
+        except OSError:
+            pass
+
+
+@contextlib.contextmanager
+def locked(folder, how=0):
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | how)
+        yield
+    finally:
+        os.close(handle)
+
+
+def make_alone(clock):
+    sweep()
+    subprocess.run([HERE / "make_image.sh", CACHE], check=True, stdout=sys.stderr)
+    version = subprocess.run(["qemu-system-aarch64", "--version"], check=True, capture_output=True, text=True).stdout
+    key = " ".join([(CACHE / "id").read_text(), version, *map(str, machine_options(clock, "", "", "", True)), str(PAYLOAD_SIZE)])
+    folder = CACHE / f"saved-{clock}-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+    disk, state = folder / "disk.qcow2", folder / "state"
+    if folder.exists():
+        return disk, state
+    note(f"booting once, clock {clock}, to save the state")
+    work = pathlib.Path(tempfile.mkdtemp(dir=CACHE, prefix="saving-"))
+    try:
+        begin = time.monotonic()
+        # A name of its own: an image made anew does not pull the disk away from under a saved state.
+        os.link(CACHE / "root.ext4", work / "root.ext4")
+        subprocess.run(["qemu-img", "create", "-q", "-f", "qcow2", "-b", "root.ext4", "-F", "raw", work / "disk.qcow2"],
+                       check=True)
+        payload = work / "payload"
+        payload.touch()
+        os.truncate(payload, PAYLOAD_SIZE)
+        with Machine(work, clock, work / "disk.qcow2", payload, []) as machine:
+            try:
+                for line in machine.lines(begin + BOOT_LIMIT_S):
+                    note(line.removeprefix("board: "))
+                    if line == "board: ready":
+                        break
+                    if line == "board: no devices":
+                        raise BoardError("guest/devices failed, see above")
+            except TimeoutError:
+                raise BoardError(f"the board did not boot in {BOOT_LIMIT_S} s; its console:\n"
+                                 + machine.console_tail()) from None
+            machine.save(work / "state")
+        for name in ("payload", "files.tar", "qmp"):
+            (work / name).unlink(missing_ok=True)
+        for old in CACHE.glob(f"saved-{clock}-*"):
+            shutil.rmtree(old)
+        work.rename(folder)
+        note(f"state saved after {time.monotonic() - begin:.0f} s")
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return disk, state
+
+
+def add(source, target):
+    """A link where it can be, else a copy."""
+    source = pathlib.Path(source)
+    if not source.exists():
+        raise UsageError(f"{source}: no such file")
+    if source.is_dir():
+        shutil.copytree(source, target, dirs_exist_ok=True)
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy(source, target)
+
+
+def run(clock, things, start, time_limit, results, hear):
+    """Runs the script `start` on a board with the things (name in /payload -> path here). hear(line) is told each line
+    of its output. Its exit code. Raises BoardError where no exit code comes."""
+    disk, state = make(clock)
+    with tempfile.TemporaryDirectory(dir=CACHE, prefix="run-") as name, locked(name):
+        work = pathlib.Path(name)
+        tree = work / "payload"
+        for inside, path in things.items():
+            add(path, tree / inside)
+        add(HERE / "guest/limited.sh", tree / ".board/limited.sh")
+        (tree / ".board/start").write_text(f"source /payload/.board/limited.sh\ncd /payload\n{start}\n")
+        image = work / "payload.ext4"
+        image.touch()
+        os.truncate(image, PAYLOAD_SIZE)
+        subprocess.run(["mkfs.ext4", "-q", "-F", "-O", "^has_journal", "-E", "root_owner=0:0", "-d", tree, image], check=True)
+        incoming = f"exec:cat {shlex.quote(str(state))}"
+        limit_s = 30 + HOST_FACTOR * time_limit
+        last = "nothing"
+        with Machine(work, clock, disk, image, ["-incoming", incoming]) as machine:
+            machine.say(f"start {int(time.time())}")
+            try:
+                for line in machine.lines(time.monotonic() + limit_s):
+                    if line.startswith("board: end "):
+                        code = int(line.removeprefix("board: end "))
+                        break
+                    if line != "board: ready":
+                        last = line
+                        hear(line)
+            except TimeoutError:
+                raise BoardError(f"the board itself hangs: no end after {limit_s} s of the host's clock; it last said: "
+                                 f"{last}\nits console:\n{machine.console_tail()}") from None
+        if results:
+            shutil.rmtree(results, ignore_errors=True)
+            pathlib.Path(results).mkdir(parents=True)
+            with tarfile.open(work / "files.tar") as archive:
+                archive.extractall(results)
+    return code
+
+
+def command_run(args):
+    program = pathlib.Path(args.program)
+    things = {program.name: program}
+    for path in args.also:
+        things[pathlib.Path(path).name] = path
+    command = shlex.join([f"./{program.name}", *args.arguments])
+    start = f"limited {args.time_limit} {shlex.quote(program.name)} {command}"
+    return run(args.clock, things, start, args.time_limit, args.results, lambda line: print(line, flush=True))
+
+
+class Case:
+    """One script of cases/: what it wants, and what it said."""
+
+    def __init__(self, path):
+        self.path = path
+        self.name = f"{path.parent.name}/{path.stem}"
+        head = path.read_text()
+        self.wants = [name for line in re.findall(r"^# wants: (.*)$", head, re.M) for name in line.split()]
+        self.limit = int((re.findall(r"^# limit: (\d+)$", head, re.M) or [120])[0])
+        self.facts = []  # (name, "ok" | "not ok" | "skip", text)
+        self.comments = []
+        self.plan = None
+
+    def hear(self, line):
+        """A line of TAP; what is none of its kinds is told with the next fact."""
+        print(f"  {line}", flush=True)
+        if match := re.fullmatch(r"(ok|not ok) \d+ - (.*?)(?: # SKIP ?(.*))?", line):
+            kind, name, skipped = match.groups()
+            text = "\n".join(self.comments) if skipped is None else f"skipped: {skipped or 'no reason given'}"
+            self.facts.append((name, kind if skipped is None else "skip", text))
+            self.comments = []
+        elif match := re.fullmatch(r"1\.\.(\d+)", line):
+            self.plan = int(match[1])
+        else:
+            self.comments.append(line.removeprefix("# "))
+
+    def fail(self, name):
+        self.facts.append((name, "not ok", "\n".join(self.comments)))
+
+    def finish(self, code):
+        if code == HUNG:
+            self.fail(f"is done within {self.limit} s")
+        elif self.plan is None or code:
+            self.fail(f"goes through to its end (code {code})")
+        elif self.plan != len(self.facts):
+            self.fail(f"has {self.plan} facts as it says, not {len(self.facts)}")
+
+
+def cases_of(names):
+    found = [Case(path) for path in sorted((HERE / "cases").glob("*/*.sh"))]
+    groups = {case.path.parent.name for case in found}
+    for name in names:
+        if name not in groups and name not in {case.name for case in found}:
+            raise UsageError(f"no such group or case: {name}; groups are {', '.join(sorted(groups))}")
+    return [case for case in found if not names or case.name in names or case.path.parent.name in names]
+
+
+def write_junit(cases, path):
+    """In the form of ctest's, so that tests/lint/report_tests.py reads it."""
+    root = xml.Element("testsuite", name="board")
+    for case in cases:
+        for name, kind, text in case.facts:
+            status = {"ok": "run", "not ok": "fail", "skip": "notrun"}[kind]
+            entry = xml.SubElement(root, "testcase", name=f"{case.name}: {name}", classname=case.name, status=status)
+            if kind == "not ok":
+                xml.SubElement(entry, "failure", message="")
+            elif kind == "skip":
+                xml.SubElement(entry, "skipped", message="")
+            # XML has no control characters.
+            xml.SubElement(entry, "system-out").text = re.sub(r"[\x00-\x08\x0b-\x1f]", "?", text)
+    pathlib.Path(path).write_bytes(xml.tostring(root))
+
+
+def command_test(args):
+    cases = cases_of(args.names)
+    build = pathlib.Path(args.build)
+    results = PROJECT / "build/board-results"
+    shutil.rmtree(results, ignore_errors=True)
+    for case in cases:
+        print(f"{case.name}", flush=True)
+        things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh"}
+        things.update({pathlib.Path(want).name: build / want for want in case.wants})
+        try:
+            case.finish(run(args.clock, things, f"limited {case.limit} {case.name} bash case.sh", case.limit,
+                            results / case.name, case.hear))
+        except BoardError as error:
+            case.comments += str(error).splitlines()
+            print(f"  {error}")
+            case.fail("comes to an end on the board")
+    write_junit(cases, args.junit)
+    for case in cases:
+        for name, kind, _ in case.facts:
+            if kind == "not ok":
+                print(f"FAILED {case.name}: {name}")
+    report = [PROJECT / "tests/lint/report_tests.py", args.junit, PROJECT / "tests/expected_skips.txt"]
+    return subprocess.run(report, check=False).returncode
+
+
+def command_targets(args):
+    print(*sorted({pathlib.Path(want).name for case in cases_of(args.names) for want in case.wants}))
+    return 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", required=True)
+    with_clock = argparse.ArgumentParser(add_help=False)
+    with_clock.add_argument("--clock", choices=CLOCKS, default="steady")
+    commands.add_parser("make", parents=[with_clock])
+    one = commands.add_parser("run", parents=[with_clock])
+    one.add_argument("--with", dest="also", action="append", default=[], metavar="PATH")
+    one.add_argument("--results", metavar="FOLDER")
+    one.add_argument("--time-limit", type=int, default=60, metavar="SECONDS")
+    one.add_argument("program")
+    one.add_argument("arguments", nargs=argparse.REMAINDER)
+    several = argparse.ArgumentParser(add_help=False)
+    several.add_argument("names", nargs="*", metavar="GROUP|GROUP/CASE")
+    test = commands.add_parser("test", parents=[with_clock, several])
+    test.add_argument("--build", default=PROJECT / "build/aarch64-board", metavar="FOLDER")
+    test.add_argument("--junit", default=PROJECT / "build/board.xml", metavar="FILE")
+    commands.add_parser("targets", parents=[several])
+    args = parser.parse_args()
+    # A finally of ours ends the emulator.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        if args.command == "make":
+            make(args.clock)
+            return 0
+        return {"run": command_run, "test": command_test, "targets": command_targets}[args.command](args)
+    except BoardError as error:
+        note(error)
+        return 2 if isinstance(error, UsageError) else 1
+    except subprocess.CalledProcessError as error:
+        note(f"{error.cmd[0]} failed (code {error.returncode})")
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,33 @@
+#!/bin/bash
+# Lines of gpio-sim by means of gpiod's tools, then our driver on real chips.
+# wants: tests/gpio_test tests/gpio_board_test
+# shellcheck source=tests/system/board/guest/tap.sh
+source /payload/.board/tap.sh
+
+chip=$(basename "$(readlink /run/rig)")
+value_while_set() {
+  gpioset --mode=signal "$chip" 0=1 &
+  eventually grep -qx 1 /run/rig/sim_gpio0/value
+  local code=$?
+  kill $!
+  return "$code"
+}
+four_edges() {
+  gpiomon --num-events=4 --format='%e %s.%n' "$chip" 1 >/run/results/edges.txt &
+  local monitor=$! level
+  eventually sh -c "gpioinfo $chip | grep -q 'READY.*used'"
+  # irq_sim tells what came since it last looked: edges without a pause between them are one.
+  for level in up down up down; do
+    echo "pull-$level" >/run/rig/sim_gpio1/pull
+    sleep 0.02
+  done
+  wait "$monitor"
+  cat /run/results/edges.txt
+  [[ $(cut -d ' ' -f 1 /run/results/edges.txt | tr -d '\n') == 1010 ]]
+}
+
+fact "what is driven is read in sysfs" value_while_set
+fact "edges arrive in their order" four_edges
+gtest gpio_test
+gtest gpio_board_test
+finish
