@@ -36,7 +36,7 @@ class SensorScript {
     std::chrono::nanoseconds time{0};
     std::uint64_t sequence = 0;
     bool damaged = false;
-    capture::SensorSettings settings;
+    capture::SensorSettings settings{};
   };
 
   /// False: no buffer was free, or no camera is open: the frame is lost.
@@ -160,8 +160,8 @@ class ScriptedCamera final : public capture::Camera {
   ScriptedCamera& operator=(const ScriptedCamera&) = delete;
   ~ScriptedCamera() override {
     const std::lock_guard lock(script_.mutex_);
-    script_.lost_in_closing_.fetch_add(static_cast<int>(
-        std::count(script_.states_.begin(), script_.states_.end(), SensorScript::State::kTaken)));
+    script_.lost_in_closing_.fetch_add(
+        static_cast<int>(std::count(script_.states_.begin(), script_.states_.end(), SensorScript::State::kTaken)));
     // Gone is gone: who reads them now is found by the sanitizer.
     script_.pixels_.clear();
     script_.states_.clear();

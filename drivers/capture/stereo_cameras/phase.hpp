@@ -25,8 +25,8 @@ namespace stereotrack::capture {
 class PhaseEstimator {
  public:
   static constexpr std::size_t kSeconds = 60;
-  static constexpr std::size_t kLeast = 5;     ///< seconds from which on the drift is told
-  static constexpr std::size_t kInOne = 64;    ///< frames of one second that are looked at
+  static constexpr std::size_t kLeast = 5;   ///< seconds from which on the drift is told
+  static constexpr std::size_t kInOne = 64;  ///< frames of one second that are looked at
 
   /// `period` > 0.
   explicit PhaseEstimator(std::chrono::nanoseconds period) noexcept : period_(period) {}
@@ -42,7 +42,7 @@ class PhaseEstimator {
 
  private:
   struct Second {
-    CaptureTime time{};    ///< middle of its frames
+    CaptureTime time{};     ///< middle of its frames
     double distance_s = 0;  ///< unfolded
   };
 

@@ -123,10 +123,10 @@ StereoCameras::StereoCameras(Open open, const Config& config)
     each.is_wanted = true;
     each.next_try = now() + each.back_off;
     each.last_refusal = failures[static_cast<std::size_t>(side)];
-    first_notes_.push_back({SourceNote::Weight::kWarning, "camera_missing", name_of(side),
-                            each.last_refusal + (side == Side::kRight
-                                                     ? "; goes on with the left camera alone, in mono, and tries again"
-                                                     : "; no pair comes until the left camera does: tries again")});
+    first_notes_.push_back(
+        {SourceNote::Weight::kWarning, "camera_missing", name_of(side),
+         each.last_refusal + (side == Side::kRight ? "; goes on with the left camera alone, in mono, and tries again"
+                                                   : "; no pair comes until the left camera does: tries again")});
   }
 }
 
@@ -297,7 +297,8 @@ void StereoCameras::arrived(PairOutlet& outlet, Side side, const SensorFrame& fr
   each.settings[frame.buffer] = frame.settings;
   const CaptureTime time(each.camera->clock_map().to_monotonic(frame.mid_exposure).time_since_epoch());
   each.last = time;
-  if (side == Side::kRight && partner.heard && !is_out(Side::kLeft)) (void)distances_.push({time, time - partner.last, false});
+  if (side == Side::kRight && partner.heard && !is_out(Side::kLeft))
+    (void)distances_.push({time, time - partner.last, false});
 
   settle(outlet, pairer_->push(side, {time, frame.sequence, frame.buffer}));
   if (is_out(other(side))) {
@@ -348,7 +349,8 @@ void StereoCameras::look_for_silence(PairOutlet& outlet, MonotonicTime now) noex
     ++quiet_ones;
     longest = std::max(longest, now - since);
     // Frames that the other one had meanwhile were triggered; this one missed them.
-    const bool alone = partner.camera && !partner.ending && partner.heard && *partner.heard - since > config_.timeout / 2;
+    const bool alone =
+        partner.camera && !partner.ending && partner.heard && *partner.heard - since > config_.timeout / 2;
     if (config_.triggered && !alone) {
       each.silent.store(true, std::memory_order_relaxed);
     } else {
@@ -381,8 +383,9 @@ void StereoCameras::count() noexcept {
     add(each.late, each.before.late, now.late);
   }
   const trigger::Pairer::Counters& c = pairer_->counters();
-  const std::array<std::uint64_t, 9> pairing{c.paired,    c.missing_left, c.missing_right, c.late,        c.out_of_order,
-                                             c.duplicate, c.disagreed,    c.clock_steps,   c.waiting_high};
+  const std::array<std::uint64_t, 9> pairing{c.paired,    c.missing_left, c.missing_right,
+                                             c.late,      c.out_of_order, c.duplicate,
+                                             c.disagreed, c.clock_steps,  c.waiting_high};
   for (std::size_t i = 0; i < pairing.size(); ++i) pairing_[i].set(pairing[i]);
 }
 

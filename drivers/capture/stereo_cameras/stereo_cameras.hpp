@@ -30,7 +30,8 @@ namespace stereotrack::capture {
 /// What goes wrong, and what follows (policy is here alone, the same for every driver):
 /// * damaged frame: given back, counted by its camera;
 /// * a frame without a partner: given back by the pairer's rules, its slot in time leaves as missing;
-/// * a camera is lost, or silent for `timeout`: it is given up. Without the right one, left pictures go on as pairs with
+/// * a camera is lost, or silent for `timeout`: it is given up. Without the right one, left pictures go on as pairs
+/// with
 ///   an empty right one (the pipeline says mono); without the left one no pair comes. The dead camera goes to the
 ///   service thread once no slot names its buffers; tend() destroys it, opens another, with back-off, and hands that
 ///   one over. The daemon goes on meanwhile, whatever is gone;
@@ -43,9 +44,9 @@ namespace stereotrack::capture {
 /// must be learnt anew (trigger::Pairer), else with the first.
 class StereoCameras final : public LiveSource {
  public:
-  static constexpr std::size_t kMostBuffers = 64;                  ///< of one camera
-  static constexpr std::chrono::milliseconds kStartUp{2000};       ///< over `timeout`, for a camera's first frame
-  static constexpr int kLeastTimeoutPeriods = 4;                   ///< a shorter `timeout` is held to so many
+  static constexpr std::size_t kMostBuffers = 64;             ///< of one camera
+  static constexpr std::chrono::milliseconds kStartUp{2000};  ///< over `timeout`, for a camera's first frame
+  static constexpr int kLeastTimeoutPeriods = 4;              ///< a shorter `timeout` is held to so many
 
   /// Opens the camera of that side; called by the constructor, then by tend(). Throws std::runtime_error, one line.
   using Open = std::function<std::unique_ptr<Camera>(trigger::Side)>;
@@ -101,7 +102,7 @@ class StereoCameras final : public LiveSource {
     MonotonicTime joined{};
     std::optional<MonotonicTime> heard;  ///< when its last good frame came
     CaptureTime last{};                  ///< of it
-    Camera::Counters before;  ///< of cameras that were
+    Camera::Counters before;             ///< of cameras that were
     std::array<SensorSettings, kMostBuffers> settings{};
 
     // ---- Handed over. Release where it is put, acquire where it is taken: the camera, and the four below
