@@ -46,6 +46,35 @@ struct Settings {
 ///     for the size is taken for it: sensors are as fast as they can be read. All told here.
 [[nodiscard]] std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>* notes = nullptr);
 
+/// What one device is and offers, for people.
+struct CameraFacts {
+  struct Size {
+    int width = 0, height = 0;          ///< [px]
+    int max_width = 0, max_height = 0;  ///< the same, where it is no range
+    std::vector<double> rates;          ///< frames a second; of a range the highest and the lowest
+  };
+  struct Format {
+    std::string fourcc;
+    std::string_view name;  ///< Settings::format; empty: cannot be used
+    std::vector<Size> sizes;
+  };
+  struct Control {
+    std::string name;
+    std::int64_t minimum = 0, maximum = 0, step = 0, standard = 0;
+    std::optional<std::int64_t> value;
+  };
+  std::string path;  ///< /dev/video0
+  std::string card;
+  std::string bus;
+  std::string driver;
+  std::vector<std::string> links;  ///< other names: /dev/v4l/by-path/...
+  std::vector<Format> formats;
+  std::vector<Control> controls;
+  std::string problem;  ///< why it could not be asked, with the way out; empty: it could
+};
+/// All that can capture, by number, and those that could not be asked.
+[[nodiscard]] std::vector<CameraFacts> list_cameras();
+
 /// Names of formats as Settings::format and `auto` know them, in the order in which `auto` takes them.
 [[nodiscard]] std::vector<std::string_view> format_names();
 
