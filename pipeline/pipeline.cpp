@@ -7,7 +7,6 @@
 #include "pipeline/motion/chroma_test.hpp"
 #include "pipeline/motion/difference.hpp"
 #include "pipeline/motion/ghost_test.hpp"
-#include "pipeline/photometry/ingest.hpp"
 #include "pipeline/photometry/smooth.hpp"
 #include "pipeline/shape/region.hpp"
 #include "pipeline/shape/threshold.hpp"
@@ -87,6 +86,8 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   self.scratch_ = arena.image<std::uint8_t>(setup.width, setup.height);
   self.moving_ = arena.image<std::uint8_t>(setup.width, setup.height);
   if (setup.calibration != nullptr) planes(self.right_, false);
+  Result<void> outcome;
+  if (!keep(self.ingest_, Ingest::create(setup.width, arena), outcome)) return fail(outcome.error());
   self.memory_.charge(MemoryPart::kPlanes, arena);
   self.equalise_left_ = Equalise({config.equalise});
   self.equalise_right_ = Equalise({config.equalise});
@@ -94,7 +95,6 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   if (setup.calibration != nullptr) {
     if (const Result<void> made = self.create_stereo(arena); !made) return fail(made.error());
   }
-  Result<void> outcome;
   Tracker::View view{setup.width, setup.height, static_cast<double>(setup.width), 0};
   if (self.rectifier_) {
     view.focal = self.rectifier_->geometry().f;
@@ -292,9 +292,9 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
 }
 
 void Pipeline::ingest(const FramePair& pair) noexcept {
-  const auto take = [](const Picture& picture, const Planes& view, Equalise& equalise, std::uint8_t* copy) {
+  const auto take = [&](const Picture& picture, const Planes& view, Equalise& equalise, std::uint8_t* copy) {
     Histogram histogram{};
-    ingest_picture(picture, {view.y, view.cb, view.cr}, equalise.needs_histogram() ? &histogram : nullptr, copy);
+    ingest_->run(picture, {view.y, view.cb, view.cr}, equalise.needs_histogram() ? &histogram : nullptr, copy);
     equalise.run(histogram, view.y);
   };
   take(pair.left, left_, equalise_left_, pair.left_copy);

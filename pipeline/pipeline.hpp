@@ -17,6 +17,7 @@
 #include "pipeline/memory_use.hpp"
 #include "pipeline/motion/mean_background.hpp"
 #include "pipeline/motion/umbra_test.hpp"
+#include "pipeline/photometry/ingest.hpp"
 #include "pipeline/pipeline_config.hpp"
 #include "pipeline/shape/contour_fill.hpp"
 #include "pipeline/shape/morphology.hpp"
@@ -179,6 +180,7 @@ class Pipeline {
   CanvasPair background_canvases_;  ///< the backgrounds' luma
   LazyCanvas right_moving_;         ///< right canvas: foreground of the right view
 
+  std::optional<Ingest> ingest_;
   Equalise equalise_left_{{}};
   Equalise equalise_right_{{}};
   std::optional<MeanBackground> mean_y_;

@@ -42,38 +42,55 @@ void put(std::span<std::byte> memory, std::size_t at, const T& value) noexcept {
 
 std::int16_t short_of(int value) noexcept { return static_cast<std::int16_t>(std::clamp(value, -32768, 32767)); }
 
-// Luma of a pixel, and where the next one's lies, in a picture as it comes.
-struct LumaPlace {
-  std::size_t first = 0;
-  std::size_t step = 1;
-};
-LumaPlace luma_place(PixelFormat format) noexcept {
-  switch (format) {
-    case PixelFormat::kYuyv: return {0, 2};
-    case PixelFormat::kUyvy: return {1, 2};
-    case PixelFormat::kBgr8: return {1, 3};  // green, which is most of it
-    case PixelFormat::kGrey8:
-    case PixelFormat::kNv12: break;
-  }
-  return {0, 1};
-}
-
-// The mean of n x n pixels of luma each.
-void shrink(const std::uint8_t* from, const About& about, int n, std::uint8_t* to) noexcept {
-  const LumaPlace luma = luma_place(about.format);
-  const std::size_t row_bytes = static_cast<std::size_t>(about.width) * bytes_per_pixel(about.format);
+// The mean of n x n pixels of luma each. luma(row, x, y): that of a pixel.
+template <class Luma>
+void shrink_by(Luma luma, const std::uint8_t* from, const About& about, int n, std::uint8_t* to) noexcept {
+  const std::size_t bytes = row_bytes(about.format, about.width);
   const int width = about.width / n;
   const int height = about.height / n;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       unsigned sum = 0;
-      for (int v = 0; v < n; ++v) {
-        const std::uint8_t* row = from + static_cast<std::size_t>(y * n + v) * row_bytes + luma.first;
-        for (int u = 0; u < n; ++u) sum += row[static_cast<std::size_t>(x * n + u) * luma.step];
+      for (int v = y * n; v < (y + 1) * n; ++v) {
+        const std::uint8_t* row = from + static_cast<std::size_t>(v) * bytes;
+        for (int u = x * n; u < (x + 1) * n; ++u) sum += luma(row, u, v);
       }
       const auto area = static_cast<unsigned>(n * n);
       *to++ = static_cast<std::uint8_t>((sum + area / 2) / area);
     }
+  }
+}
+
+// Of what has one sample a pixel; of a mosaic the green one, of the pixel or of the one beside it.
+template <SampleLayout kLayout>
+void shrink_samples(const std::uint8_t* from, const About& about, int n, std::uint8_t* to) noexcept {
+  if (!is_bayer(about.format)) {
+    return shrink_by([](const auto* row, int x, int) { return sample_of(kLayout, row, x); }, from, about, n, to);
+  }
+  const BayerRed red = bayer_red(about.format);
+  shrink_by(
+      [&](const auto* row, int x, int y) { return sample_of(kLayout, row, x - x % 2 + (1 + red.x + red.y + y) % 2); },
+      from, about, n, to);
+}
+
+void shrink(const std::uint8_t* from, const About& about, int n, std::uint8_t* to) noexcept {
+  switch (about.format) {
+    case PixelFormat::kYuyv:
+      return shrink_by([](const auto* row, int x, int) { return row[2 * x]; }, from, about, n, to);
+    case PixelFormat::kUyvy:
+      return shrink_by([](const auto* row, int x, int) { return row[2 * x + 1]; }, from, about, n, to);
+    case PixelFormat::kBgr8:
+    case PixelFormat::kRgb8:  // green, which is most of it
+      return shrink_by([](const auto* row, int x, int) { return row[3 * x + 1]; }, from, about, n, to);
+    default: break;
+  }
+  switch (sample_layout(about.format)) {
+    case SampleLayout::kBytes: return shrink_samples<SampleLayout::kBytes>(from, about, n, to);
+    case SampleLayout::kWords10: return shrink_samples<SampleLayout::kWords10>(from, about, n, to);
+    case SampleLayout::kWords12: return shrink_samples<SampleLayout::kWords12>(from, about, n, to);
+    case SampleLayout::kWords16: return shrink_samples<SampleLayout::kWords16>(from, about, n, to);
+    case SampleLayout::kPacked10: return shrink_samples<SampleLayout::kPacked10>(from, about, n, to);
+    case SampleLayout::kPacked12: return shrink_samples<SampleLayout::kPacked12>(from, about, n, to);
   }
 }
 

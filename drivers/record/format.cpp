@@ -12,11 +12,29 @@ struct Name {
   PixelFormat format;
   const char* name;
 };
-constexpr std::array<Name, 5> kFormats{{{PixelFormat::kGrey8, "grey8"},
-                                        {PixelFormat::kBgr8, "bgr8"},
-                                        {PixelFormat::kYuyv, "yuyv"},
-                                        {PixelFormat::kUyvy, "uyvy"},
-                                        {PixelFormat::kNv12, "nv12"}}};
+constexpr std::array<Name, kPixelFormats> kFormats{{{PixelFormat::kGrey8, "grey8"},
+                                                    {PixelFormat::kBgr8, "bgr8"},
+                                                    {PixelFormat::kYuyv, "yuyv"},
+                                                    {PixelFormat::kUyvy, "uyvy"},
+                                                    {PixelFormat::kNv12, "nv12"},
+                                                    {PixelFormat::kGrey10, "grey10"},
+                                                    {PixelFormat::kGrey12, "grey12"},
+                                                    {PixelFormat::kGrey16, "grey16"},
+                                                    {PixelFormat::kGrey10Packed, "grey10p"},
+                                                    {PixelFormat::kGrey12Packed, "grey12p"},
+                                                    {PixelFormat::kRgb8, "rgb8"},
+                                                    {PixelFormat::kBayerRggb8, "rggb8"},
+                                                    {PixelFormat::kBayerGrbg8, "grbg8"},
+                                                    {PixelFormat::kBayerGbrg8, "gbrg8"},
+                                                    {PixelFormat::kBayerBggr8, "bggr8"},
+                                                    {PixelFormat::kBayerRggb10, "rggb10"},
+                                                    {PixelFormat::kBayerGrbg10, "grbg10"},
+                                                    {PixelFormat::kBayerGbrg10, "gbrg10"},
+                                                    {PixelFormat::kBayerBggr10, "bggr10"},
+                                                    {PixelFormat::kBayerRggb10Packed, "rggb10p"},
+                                                    {PixelFormat::kBayerGrbg10Packed, "grbg10p"},
+                                                    {PixelFormat::kBayerGbrg10Packed, "gbrg10p"},
+                                                    {PixelFormat::kBayerBggr10Packed, "bggr10p"}}};
 
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');

@@ -163,8 +163,8 @@ capture::Next RecordingSource::next(FramePair& out) noexcept {
   }
   const auto* pixels = reinterpret_cast<const std::uint8_t*>(record.payload.data() + kFrameHead);
   const auto picture = [&](const std::uint8_t* data) {
-    return Picture{data, about_.width, about_.height, std::ptrdiff_t{about_.width} * bytes_per_pixel(about_.format),
-                   about_.format};
+    const auto stride = static_cast<std::ptrdiff_t>(row_bytes(about_.format, about_.width));
+    return Picture{data, about_.width, about_.height, stride, about_.format};
   };
   out.left = picture(pixels);
   if (about_.stereo) out.right = picture(pixels + picture_bytes(about_.format, about_.width, about_.height));

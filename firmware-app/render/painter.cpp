@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "firmware-app/render/style.hpp"
+#include "pipeline/photometry/ingest_kernel.hpp"
 
 namespace stereotrack::render {
 namespace {
@@ -39,6 +40,20 @@ cv::Rect fit(cv::Size shape, cv::Rect area) {
   return {area.x + (area.width - width) / 2, area.y + (area.height - height) / 2, width, height};
 }
 
+// What has one sample a pixel, as 8 bits.
+cv::Mat samples_of(const Picture& raw) {
+  cv::Mat samples(raw.height, raw.width, CV_8UC1);
+  for (int y = 0; y < raw.height; ++y) unpack_row(raw.row(y), sample_layout(raw.format), raw.width, samples.ptr(y));
+  return samples;
+}
+
+// OpenCV names a mosaic after the square that begins at its second row and column.
+int demosaicing_of(PixelFormat format) {
+  const BayerRed red = bayer_red(format);
+  if (red.y == 0) return red.x == 0 ? cv::COLOR_BayerBG2BGR : cv::COLOR_BayerGB2BGR;
+  return red.x == 0 ? cv::COLOR_BayerGR2BGR : cv::COLOR_BayerRG2BGR;
+}
+
 cv::Mat to_bgr(const Picture& raw) {
   // OpenCV has no Mat over const pixels; they are only read.
   auto* pixels = const_cast<std::uint8_t*>(raw.data);
@@ -49,10 +64,13 @@ cv::Mat to_bgr(const Picture& raw) {
   cv::Mat colour;
   switch (raw.format) {
     case PixelFormat::kBgr8: return memory(CV_8UC3);
+    case PixelFormat::kRgb8: cv::cvtColor(memory(CV_8UC3), colour, cv::COLOR_RGB2BGR); break;
     case PixelFormat::kYuyv: cv::cvtColor(memory(CV_8UC2), colour, cv::COLOR_YUV2BGR_YUYV); break;
     case PixelFormat::kUyvy: cv::cvtColor(memory(CV_8UC2), colour, cv::COLOR_YUV2BGR_UYVY); break;
     case PixelFormat::kNv12: cv::cvtColor(memory(CV_8UC1), colour, cv::COLOR_YUV2BGR_NV12); break;
-    case PixelFormat::kGrey8: cv::cvtColor(memory(CV_8UC1), colour, cv::COLOR_GRAY2BGR); break;
+    default:
+      cv::cvtColor(samples_of(raw), colour, is_bayer(raw.format) ? demosaicing_of(raw.format) : cv::COLOR_GRAY2BGR);
+      break;
   }
   return colour;
 }

@@ -124,7 +124,7 @@ class Replay {
   // False if it was interrupted.
   bool run() {
     const capture::SourceInfo& info = rig_.source->info();
-    if (info.format == PixelFormat::kGrey8) messages_ << info.name << ": grey source, the chroma tests are skipped\n";
+    if (!has_colour(info.format)) messages_ << info.name << ": grey source, the chroma tests are skipped\n";
     if (!info.stereo) messages_ << info.name << ": mono source, 2-D tracks without distance\n";
     if (arguments_.frames.first > 1) rig_.source->skip_to(arguments_.frames.first - 1);
     if (rig_.recording != nullptr) begin_recording(*rig_.recording);
@@ -350,9 +350,9 @@ int check_replay(const ReplayArguments& arguments, std::ostream& out) {
   Arena arena;
   const Pipeline pipeline = make_pipeline(rig, rig.source->info(), arena);
   const capture::SourceInfo& info = rig.source->info();
-  out << info.name << ": " << info.width << 'x' << info.height << ' '
-      << (info.format == PixelFormat::kGrey8 ? "grey" : "colour") << ' ' << (info.stereo ? "stereo" : "mono")
-      << ", preset " << rig.configuration().preset << ": configuration, calibration and source are fine\n";
+  out << info.name << ": " << info.width << 'x' << info.height << ' ' << (has_colour(info.format) ? "colour" : "grey")
+      << ' ' << (info.stereo ? "stereo" : "mono") << ", preset " << rig.configuration().preset
+      << ": configuration, calibration and source are fine\n";
   print_memory(out, pipeline.memory());
   out << "the arena took " << arena.capacity() << " bytes from the system and takes no more\n";
   return 0;

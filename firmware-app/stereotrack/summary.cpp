@@ -40,10 +40,9 @@ void Digest::add(const Picture& picture) noexcept {
                                           static_cast<std::uint32_t>(picture.height),
                                           static_cast<std::uint32_t>(picture.format)};
   add(std::as_bytes(std::span(head)));
-  const auto row_bytes =
-      static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(bytes_per_pixel(picture.format));
+  const std::size_t bytes = row_bytes(picture.format, picture.width);
   const int rows = memory_rows(picture.format, picture.height);
-  for (int y = 0; y < rows; ++y) add(std::as_bytes(std::span(picture.row(y), row_bytes)));
+  for (int y = 0; y < rows; ++y) add(std::as_bytes(std::span(picture.row(y), bytes)));
 }
 
 std::string Digest::hex() const {

@@ -22,7 +22,9 @@ namespace {
 #if HWY_TARGET == HWY_SCALAR
 
 int copied_pixels(const std::uint8_t*, int, std::uint8_t*) { return 0; }
-int bgr_pixels(const std::uint8_t*, int, const PlaneRow&) { return 0; }
+int unpacked_pixels(const std::uint8_t*, SampleLayout, int, std::uint8_t*) { return 0; }
+int colour_pixels(const std::uint8_t*, ColourOrder, int, const PlaneRow&) { return 0; }
+int bayer_pixels(const BayerRows&, int, const PlaneRow&) { return 0; }
 int packed_pixels(const std::uint8_t*, PackedOrder, int, const PlaneRow&) { return 0; }
 int chroma_pairs(const std::uint8_t*, int, std::uint8_t*, std::uint8_t*) { return 0; }
 
@@ -69,6 +71,12 @@ class Luma {
   Word low_b_ = factor(76);
 };
 
+struct Colours {
+  Word b;
+  Word g;
+  Word r;
+};
+
 // (w (colour - luma) + 2^13) >> 14 = (2 w (colour - luma) + 2^14) >> 15, which is one instruction, and 128. A colour
 // and its own luma never give less than 0, and 256 at most.
 template <int kWeight>
@@ -78,27 +86,160 @@ Word difference_of(Word colour, Word luma) {
   return hn::BitCast(kWords, hn::Min(value, hn::Set(kSigned, 255)));
 }
 
-int bgr_pixels(const std::uint8_t* bgr, int width, const PlaneRow& out) {
+// Luma and chroma of the even and the odd pixels of a vector.
+void store_colours(const Luma& luma, const Colours& even, const Colours& odd, int x, const PlaneRow& out) {
+  const Word even_y = luma.of(even.b, even.g, even.r);
+  const Word odd_y = luma.of(odd.b, odd.g, odd.r);
+  hn::StoreU(zip_bytes(even_y, odd_y), kBytes, out.y + x);
+  if (out.cb == nullptr) return;
+  hn::StoreU(zip_bytes(difference_of<9241>(even.b, even_y), difference_of<9241>(odd.b, odd_y)), kBytes, out.cb + x);
+  hn::StoreU(zip_bytes(difference_of<11682>(even.r, even_y), difference_of<11682>(odd.r, odd_y)), kBytes, out.cr + x);
+}
+
+int colour_pixels(const std::uint8_t* pixels, ColourOrder order, int width, const PlaneRow& out) {
   const Luma luma;
   const int lanes = static_cast<int>(hn::Lanes(kBytes));
   int x = 0;
   for (; x + lanes <= width; x += lanes) {
-    Byte b = hn::Zero(kBytes);
-    Byte g = b;
-    Byte r = b;
-    hn::LoadInterleaved3(kBytes, bgr + 3 * x, b, g, r);
-    const Word even_b = even_bytes(b);
-    const Word odd_b = odd_bytes(b);
-    const Word even_r = even_bytes(r);
-    const Word odd_r = odd_bytes(r);
-    const Word even_y = luma.of(even_b, even_bytes(g), even_r);
-    const Word odd_y = luma.of(odd_b, odd_bytes(g), odd_r);
-    hn::StoreU(zip_bytes(even_y, odd_y), kBytes, out.y + x);
-    if (out.cb == nullptr) continue;
-    hn::StoreU(zip_bytes(difference_of<9241>(even_b, even_y), difference_of<9241>(odd_b, odd_y)), kBytes, out.cb + x);
-    hn::StoreU(zip_bytes(difference_of<11682>(even_r, even_y), difference_of<11682>(odd_r, odd_y)), kBytes, out.cr + x);
+    Byte first = hn::Zero(kBytes);
+    Byte g = first;
+    Byte last = first;
+    hn::LoadInterleaved3(kBytes, pixels + 3 * x, first, g, last);
+    const Byte b = order == ColourOrder::kBlueFirst ? first : last;
+    const Byte r = order == ColourOrder::kBlueFirst ? last : first;
+    store_colours(luma, {even_bytes(b), even_bytes(g), even_bytes(r)}, {odd_bytes(b), odd_bytes(g), odd_bytes(r)}, x,
+                  out);
   }
   return x;
+}
+
+Word mean_of(Word a, Word b) { return hn::ShiftRight<1>(hn::Add(hn::Add(a, b), hn::Set(kWords, std::uint16_t{1}))); }
+Word mean_of(Word a, Word b, Word c, Word d) {
+  return hn::ShiftRight<2>(hn::Add(hn::Add(hn::Add(a, b), hn::Add(c, d)), hn::Set(kWords, std::uint16_t{2})));
+}
+
+// What lies on the left of the even pixels and on the right of the odd ones; the others are neighbours of each other.
+Word before_even(const std::uint8_t* row) { return even_bytes(hn::LoadU(kBytes, row - 1)); }
+Word after_odd(const std::uint8_t* row) { return odd_bytes(hn::LoadU(kBytes, row + 1)); }
+
+template <bool kRed, bool kGreenFirst>
+int mosaic_pixels(const BayerRows& rows, int width, const PlaneRow& out) {
+  const Luma luma;
+  const auto colours = [](Word own, Word green, Word other) {
+    return kRed ? Colours{other, green, own} : Colours{own, green, other};
+  };
+  const int lanes = static_cast<int>(hn::Lanes(kBytes));
+  int x = 0;
+  for (; x + lanes <= width; x += lanes) {
+    const Byte above = hn::LoadU(kBytes, rows.above + x);
+    const Byte row = hn::LoadU(kBytes, rows.row + x);
+    const Byte below = hn::LoadU(kBytes, rows.below + x);
+    const Word even = even_bytes(row);
+    const Word odd = odd_bytes(row);
+    const Word even_above = even_bytes(above);
+    const Word odd_above = odd_bytes(above);
+    const Word even_below = even_bytes(below);
+    const Word odd_below = odd_bytes(below);
+    if constexpr (kGreenFirst) {
+      const Colours at_green = colours(mean_of(before_even(rows.row + x), odd), even, mean_of(even_above, even_below));
+      const Colours at_colour =
+          colours(odd, mean_of(odd_above, odd_below, even, after_odd(rows.row + x)),
+                  mean_of(even_above, after_odd(rows.above + x), even_below, after_odd(rows.below + x)));
+      store_colours(luma, at_green, at_colour, x, out);
+    } else {
+      const Colours at_colour =
+          colours(even, mean_of(even_above, even_below, before_even(rows.row + x), odd),
+                  mean_of(before_even(rows.above + x), odd_above, before_even(rows.below + x), odd_below));
+      const Colours at_green = colours(mean_of(even, after_odd(rows.row + x)), odd, mean_of(odd_above, odd_below));
+      store_colours(luma, at_colour, at_green, x, out);
+    }
+  }
+  return x;
+}
+
+int bayer_pixels(const BayerRows& rows, int width, const PlaneRow& out) {
+  if (rows.red) {
+    return rows.green_first ? mosaic_pixels<true, true>(rows, width, out)
+                            : mosaic_pixels<true, false>(rows, width, out);
+  }
+  return rows.green_first ? mosaic_pixels<false, true>(rows, width, out)
+                          : mosaic_pixels<false, false>(rows, width, out);
+}
+
+// Little-endian, as all targets of simd.hpp are.
+int word_pixels(const std::uint8_t* row, int bits, int width, std::uint8_t* out) {
+  const int lanes = static_cast<int>(hn::Lanes(kBytes));
+  int x = 0;
+  for (; x + lanes <= width; x += lanes) {
+    const Word first = hn::BitCast(kWords, hn::LoadU(kBytes, row + 2 * x));
+    const Word second = hn::BitCast(kWords, hn::LoadU(kBytes, row + 2 * x + lanes));
+    const Byte low = hn::BitCast(kBytes, hn::ShiftRightSame(first, bits - 8));
+    const Byte high = hn::BitCast(kBytes, hn::ShiftRightSame(second, bits - 8));
+    hn::StoreU(hn::ConcatEven(kBytes, high, low), kBytes, out + x);
+  }
+  return x;
+}
+
+int packed12_pixels(const std::uint8_t* row, int width, std::uint8_t* out) {
+  const int lanes = static_cast<int>(hn::Lanes(kBytes));
+  int x = 0;
+  for (; x + 2 * lanes <= width; x += 2 * lanes) {
+    Byte first = hn::Zero(kBytes);
+    Byte second = first;
+    Byte rests = first;
+    hn::LoadInterleaved3(kBytes, row + 3 * (x / 2), first, second, rests);
+    hn::StoreInterleaved2(first, second, kBytes, out + x);
+  }
+  return x;
+}
+
+// 64 pixels are 80 bytes, five blocks of 16: 16 pixels each lie in two neighbours of them, and pixel p is byte p + p/4.
+// Which byte of the first block each pixel is, and which of the second; kNone: of neither.
+constexpr std::uint8_t kNone = 0x80;
+struct Packed10Table {
+  alignas(16) std::uint8_t first[4][16];
+  alignas(16) std::uint8_t second[4][16];
+};
+constexpr Packed10Table packed10_table() {
+  Packed10Table table{};
+  for (int block = 0; block < 4; ++block) {
+    for (int i = 0; i < 16; ++i) {
+      const int pixel = 16 * block + i;
+      const int at = pixel + pixel / 4 - 16 * block;
+      table.first[block][i] = at < 16 ? static_cast<std::uint8_t>(at) : kNone;
+      table.second[block][i] = at < 16 ? kNone : static_cast<std::uint8_t>(at - 16);
+    }
+  }
+  return table;
+}
+
+int packed10_pixels(const std::uint8_t* row, int width, std::uint8_t* out) {
+  constexpr hn::FixedTag<std::uint8_t, 16> kBlock;
+  static constexpr Packed10Table kTable = packed10_table();
+  int x = 0;
+  for (; x + 64 <= width; x += 64, row += 80) {
+    auto first = hn::LoadU(kBlock, row);
+    for (int block = 0; block < 4; ++block) {
+      const auto second = hn::LoadU(kBlock, row + 16 * (block + 1));
+      const auto pixels = hn::Or(hn::TableLookupBytesOr0(first, hn::Load(kBlock, kTable.first[block])),
+                                 hn::TableLookupBytesOr0(second, hn::Load(kBlock, kTable.second[block])));
+      hn::StoreU(pixels, kBlock, out + x + 16 * block);
+      first = second;
+    }
+  }
+  return x;
+}
+
+int unpacked_pixels(const std::uint8_t* row, SampleLayout layout, int width, std::uint8_t* out) {
+  switch (layout) {
+    case SampleLayout::kBytes: break;
+    case SampleLayout::kWords10: return word_pixels(row, 10, width, out);
+    case SampleLayout::kWords12: return word_pixels(row, 12, width, out);
+    case SampleLayout::kWords16: return word_pixels(row, 16, width, out);
+    case SampleLayout::kPacked10: return packed10_pixels(row, width, out);
+    case SampleLayout::kPacked12: return packed12_pixels(row, width, out);
+  }
+  return copied_pixels(row, width, out);
 }
 
 // Cb of the pairs Cb Cr for both pixels of each, and Cr.
@@ -144,7 +285,9 @@ namespace stereotrack {
 namespace {
 
 HWY_EXPORT(copied_pixels);
-HWY_EXPORT(bgr_pixels);
+HWY_EXPORT(unpacked_pixels);
+HWY_EXPORT(colour_pixels);
+HWY_EXPORT(bayer_pixels);
 HWY_EXPORT(packed_pixels);
 HWY_EXPORT(chroma_pairs);
 
@@ -160,16 +303,39 @@ void copy_row_reference(const std::uint8_t* pixels, int width, std::uint8_t* out
   for (int x = 0; x < width; ++x) out[x] = from[x];
 }
 
-void bgr_row_reference(const std::uint8_t* bgr, int width, const PlaneRow& out) noexcept {
+void unpack_row_reference(const std::uint8_t* row, SampleLayout layout, int width, std::uint8_t* out) noexcept {
+  for (int x = 0; x < width; ++x) out[x] = sample_of(layout, row, x);
+}
+
+namespace {
+
+void put_colour(int b, int g, int r, int x, const PlaneRow& out) noexcept {
+  const std::uint8_t y = luma(b, g, r);
+  out.y[x] = y;
+  if (out.cb == nullptr) return;
+  out.cb[x] = chroma_blue(b, y);
+  out.cr[x] = chroma_red(r, y);
+}
+
+}  // namespace
+
+void colour_row_reference(const std::uint8_t* pixels, ColourOrder order, int width, const PlaneRow& out) noexcept {
+  const int blue = order == ColourOrder::kBlueFirst ? 0 : 2;
   for (int x = 0; x < width; ++x) {
-    const int b = bgr[3 * x];
-    const int g = bgr[3 * x + 1];
-    const int r = bgr[3 * x + 2];
-    const std::uint8_t y = luma(b, g, r);
-    out.y[x] = y;
-    if (out.cb == nullptr) continue;
-    out.cb[x] = chroma_blue(b, y);
-    out.cr[x] = chroma_red(r, y);
+    const std::uint8_t* pixel = pixels + 3 * x;
+    put_colour(pixel[blue], pixel[1], pixel[2 - blue], x, out);
+  }
+}
+
+void bayer_row_reference(const BayerRows& rows, int width, const PlaneRow& out) noexcept {
+  const auto& [above, row, below, red, green_first] = rows;
+  for (int x = 0; x < width; ++x) {
+    const bool at_green = (x % 2 == 0) == green_first;
+    const int green = at_green ? row[x] : (above[x] + below[x] + row[x - 1] + row[x + 1] + 2) / 4;
+    const int own = at_green ? (row[x - 1] + row[x + 1] + 1) / 2 : row[x];
+    const int other =
+        at_green ? (above[x] + below[x] + 1) / 2 : (above[x - 1] + above[x + 1] + below[x - 1] + below[x + 1] + 2) / 4;
+    put_colour(red ? other : own, green, red ? own : other, x, out);
   }
 }
 
@@ -199,9 +365,23 @@ void copy_row(const std::uint8_t* pixels, int width, std::uint8_t* out) noexcept
   copy_row_reference(pixels + done, width - done, out + done);
 }
 
-void bgr_row(const std::uint8_t* bgr, int width, const PlaneRow& out) noexcept {
-  const int done = simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(bgr_pixels)(bgr, width, out);
-  bgr_row_reference(bgr + 3 * done, width - done, rest_of(out, done));
+void unpack_row(const std::uint8_t* row, SampleLayout layout, int width, std::uint8_t* out) noexcept {
+  if (layout == SampleLayout::kBytes) return copy_row(row, width, out);
+  const int done =
+      simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(unpacked_pixels)(row, layout, width, out);
+  unpack_row_reference(row + row_bytes(layout, done), layout, width - done, out + done);
+}
+
+void colour_row(const std::uint8_t* pixels, ColourOrder order, int width, const PlaneRow& out) noexcept {
+  const int done =
+      simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(colour_pixels)(pixels, order, width, out);
+  colour_row_reference(pixels + 3 * done, order, width - done, rest_of(out, done));
+}
+
+void bayer_row(const BayerRows& rows, int width, const PlaneRow& out) noexcept {
+  const int done = simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(bayer_pixels)(rows, width, out);
+  const BayerRows rest{rows.above + done, rows.row + done, rows.below + done, rows.red, rows.green_first};
+  bayer_row_reference(rest, width - done, rest_of(out, done));
 }
 
 void packed_row(const std::uint8_t* pixels, PackedOrder order, int width, const PlaneRow& out) noexcept {

@@ -231,8 +231,10 @@ void mark_matcher(Marks& marks, const std::string& name, const FramePair& pair, 
   const ImageView<std::uint8_t> left = arena.image<std::uint8_t>(kWidth, kHeight);
   const ImageView<std::uint8_t> right = arena.image<std::uint8_t>(kWidth, kHeight);
   const ImageView<std::uint16_t> out = arena.image<std::uint16_t>(kWidth, kHeight);
-  ingest_picture(pair.left, {.y = left, .cb = {}, .cr = {}}, nullptr);
-  ingest_picture(pair.right, {.y = right, .cb = {}, .cr = {}}, nullptr);
+  Result<Ingest> ingest = Ingest::create(kWidth, arena);
+  if (!ingest.has_value()) throw std::runtime_error(name + ": " + to_string(ingest.error()));
+  ingest->run(pair.left, {.y = left, .cb = {}, .cr = {}}, nullptr);
+  ingest->run(pair.right, {.y = right, .cb = {}, .cr = {}}, nullptr);
   typename Matcher::Config config;
   config.width = kWidth;
   config.height = kHeight;

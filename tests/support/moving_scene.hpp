@@ -26,7 +26,7 @@ struct SceneFormat {
 template <PixelFormat kFormat>
 void pack_as(const std::vector<std::uint8_t>& bgr, int width, int height, std::vector<std::uint8_t>& out) {
   lay_out({bgr.data(), width, height, std::ptrdiff_t{width} * 3, PixelFormat::kBgr8}, kFormat,
-          std::ptrdiff_t{width} * bytes_per_pixel(kFormat), out);
+          static_cast<std::ptrdiff_t>(row_bytes(kFormat, width)), out);
 }
 
 /// Every format of pipeline/frame.hpp. A new one needs a line here and nothing else.
@@ -161,7 +161,8 @@ class MovingScene {
   }
 
   [[nodiscard]] Picture packed(const std::vector<std::uint8_t>& pixels) const {
-    return {pixels.data(), kWidth, kHeight, std::ptrdiff_t{kWidth} * bytes_per_pixel(format_.format), format_.format};
+    const auto stride = static_cast<std::ptrdiff_t>(row_bytes(format_.format, kWidth));
+    return {pixels.data(), kWidth, kHeight, stride, format_.format};
   }
 
   const SceneFormat& format_;

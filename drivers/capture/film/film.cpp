@@ -27,7 +27,7 @@ void sleep_until(MonotonicTime moment) noexcept {
 
 std::unique_ptr<std::uint8_t[]> Film::keep(Picture& picture, const Config& config) {
   if (picture.empty()) return nullptr;
-  const std::size_t row = static_cast<std::size_t>(picture.width) * bytes_per_pixel(picture.format);
+  const std::size_t row = row_bytes(picture.format, picture.width);
   const int rows = memory_rows(picture.format, picture.height);
   const std::size_t size = row * static_cast<std::size_t>(rows);
   bytes_ += size;

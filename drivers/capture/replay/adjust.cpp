@@ -43,7 +43,7 @@ PixelFormat format_of(const cv::Mat& picture) {
 }
 
 void convert(cv::Mat& picture, PixelFormat format) {
-  if (bytes_per_pixel(format) == picture.channels()) return;
+  if ((format == PixelFormat::kBgr8 ? 3 : 1) == picture.channels()) return;
   cv::Mat converted;
   cv::cvtColor(picture, converted, format == PixelFormat::kBgr8 ? cv::COLOR_GRAY2BGR : cv::COLOR_BGR2GRAY);
   picture = converted;

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "pipeline/photometry/colour.hpp"
 #include "tests/support/each_target.hpp"
 
 namespace stereotrack {
@@ -42,10 +45,10 @@ TEST(IngestKernel, EveryColourIsTheReference) {
       bgr[3 * i + 2] = static_cast<std::uint8_t>(i >> 8);
     }
     Out expected(kSize);
-    bgr_row_reference(bgr.data(), kSize, expected.colour());
+    colour_row_reference(bgr.data(), ColourOrder::kBlueFirst, kSize, expected.colour());
     on_each_target([&] {
       Out got(kSize);
-      bgr_row(bgr.data(), kSize, got.colour());
+      colour_row(bgr.data(), ColourOrder::kBlueFirst, kSize, got.colour());
       EXPECT_TRUE(got == expected) << "blue " << b;
     });
   }
@@ -70,8 +73,14 @@ void expect_reference_at_every_length(int step, Rows&& row, Reference&& referenc
   }
 }
 
-TEST(IngestKernel, BgrRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
-  expect_reference_at_every_length(1, bgr_row, bgr_row_reference);
+TEST(IngestKernel, ColourRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  for (const ColourOrder order : {ColourOrder::kBlueFirst, ColourOrder::kRedFirst}) {
+    expect_reference_at_every_length(
+        1, [&](const std::uint8_t* from, int width, const PlaneRow& out) { colour_row(from, order, width, out); },
+        [&](const std::uint8_t* from, int width, const PlaneRow& out) {
+          colour_row_reference(from, order, width, out);
+        });
+  }
 }
 
 TEST(IngestKernel, CopiedRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
@@ -88,6 +97,94 @@ TEST(IngestKernel, PackedRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched
           packed_row_reference(from, order, width, out);
         });
   }
+}
+
+TEST(IngestKernel, UnpackedRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  struct Layout {
+    SampleLayout layout;
+    int together;
+  };
+  for (const Layout& one : {Layout{SampleLayout::kBytes, 1},
+                            {SampleLayout::kWords10, 1},
+                            {SampleLayout::kWords12, 1},
+                            {SampleLayout::kWords16, 1},
+                            {SampleLayout::kPacked10, 4},
+                            {SampleLayout::kPacked12, 2}}) {
+    SCOPED_TRACE(static_cast<int>(one.layout));
+    expect_reference_at_every_length(
+        one.together,
+        [&](const std::uint8_t* from, int width, const PlaneRow& out) { unpack_row(from, one.layout, width, out.y); },
+        [&](const std::uint8_t* from, int width, const PlaneRow& out) {
+          unpack_row_reference(from, one.layout, width, out.y);
+        });
+  }
+}
+
+// Each value of 16 bits, those too that a sample of 10 or 12 cannot have.
+TEST(IngestKernel, EveryWordIsItsMostSignificantBits) {
+  Row words(2 * 65536);
+  for (std::size_t i = 0; i < 65536; ++i) {
+    words[2 * i] = static_cast<std::uint8_t>(i);
+    words[2 * i + 1] = static_cast<std::uint8_t>(i >> 8);
+  }
+  on_each_target([&] {
+    for (const auto& [layout, shift] :
+         {std::pair{SampleLayout::kWords10, 2}, {SampleLayout::kWords12, 4}, {SampleLayout::kWords16, 8}}) {
+      Row got(65536);
+      unpack_row(words.data(), layout, 65536, got.data());
+      int wrong = 0;
+      for (std::size_t i = 0; i < 65536; ++i) wrong += got[i] == static_cast<std::uint8_t>(i >> shift) ? 0 : 1;
+      EXPECT_EQ(wrong, 0) << "by " << shift;
+    }
+  });
+}
+
+TEST(IngestKernel, PackedSamplesByHand) {
+  // V4L2_PIX_FMT_Y10P: four bytes of bits 9..2, one of the bits 1..0. V4L2_PIX_FMT_Y12P: two and one.
+  on_each_target([] {
+    const Row ten{1, 2, 3, 4, 0xFF, 5, 6, 7, 255, 0xFF};
+    Row out(9, 77);
+    unpack_row(ten.data(), SampleLayout::kPacked10, 8, out.data());
+    EXPECT_EQ(out, (Row{1, 2, 3, 4, 5, 6, 7, 255, 77}));
+    const Row twelve{1, 2, 0xFF, 3, 255, 0xFF};
+    out.assign(5, 77);
+    unpack_row(twelve.data(), SampleLayout::kPacked12, 4, out.data());
+    EXPECT_EQ(out, (Row{1, 2, 3, 255, 77}));
+  });
+}
+
+TEST(IngestKernel, BayerRowIsTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {
+  for (const bool red : {false, true}) {
+    for (const bool green_first : {false, true}) {
+      SCOPED_TRACE(std::string(red ? "red" : "blue") + (green_first ? " after green" : " first"));
+      const auto rows = [&](const std::uint8_t* from) {
+        return BayerRows{from, from + 250, from + 600, red, green_first};
+      };
+      expect_reference_at_every_length(
+          2, [&](const std::uint8_t* from, int width, const PlaneRow& out) { bayer_row(rows(from), width, out); },
+          [&](const std::uint8_t* from, int width, const PlaneRow& out) {
+            bayer_row_reference(rows(from), width, out);
+          });
+    }
+  }
+}
+
+TEST(IngestKernel, BayerRowByHand) {
+  // Columns -1 to 4 of a row of green and red, of blue and green above and below. At (0): red 60, green (10 + 20 + 30 +
+  // 41 + 2) / 4 = 25, blue (100 + 110 + 120 + 131 + 2) / 4 = 115. At (1): green 30, red (60 + 71 + 1) / 2 = 66, blue
+  // (110 + 131 + 1) / 2 = 121.
+  const Row above{100, 10, 110, 11, 112, 12};
+  const Row row{41, 60, 30, 71, 31, 80};
+  const Row below{120, 20, 131, 21, 133, 22};
+  on_each_target([&] {
+    Out out(2);
+    bayer_row({above.data() + 1, row.data() + 1, below.data() + 1, true, false}, 2, out.colour());
+    const std::uint8_t first = luma(115, 25, 60);
+    const std::uint8_t second = luma(121, 30, 66);
+    EXPECT_EQ(out.rows[0], (Row{first, second, 77}));
+    EXPECT_EQ(out.rows[1], (Row{chroma_blue(115, first), chroma_blue(121, second), 77}));
+    EXPECT_EQ(out.rows[2], (Row{chroma_red(60, first), chroma_red(66, second), 77}));
+  });
 }
 
 TEST(IngestKernel, ChromaPairsAreTheReferenceAtEveryLengthAndNothingBeyondIsTouched) {

@@ -93,22 +93,24 @@ TEST(IngestOnce, EachPageOfEachFormatIsReadOnceAndInOrder) {
   Arena arena;
   const IngestPlanes planes{arena.image<std::uint8_t>(width, height), arena.image<std::uint8_t>(width, height),
                             arena.image<std::uint8_t>(width, height)};
-  for (const PixelFormat format :
-       {PixelFormat::kGrey8, PixelFormat::kBgr8, PixelFormat::kYuyv, PixelFormat::kUyvy, PixelFormat::kNv12}) {
-    const std::size_t row_bytes = static_cast<std::size_t>(width) * static_cast<std::size_t>(bytes_per_pixel(format));
+  Result<Ingest> ingest = Ingest::create(width, arena);
+  ASSERT_TRUE(ingest.has_value());
+  for (int number = 0; number < kPixelFormats; ++number) {
+    const auto format = static_cast<PixelFormat>(number);
+    const std::size_t stride = row_bytes(format, width);
     const std::size_t rows = static_cast<std::size_t>(memory_rows(format, height));
-    WatchedPages source(row_bytes * rows);
+    WatchedPages source(stride * rows);
     ASSERT_NE(source.data(), nullptr);
-    for (std::size_t i = 0; i < row_bytes * rows; ++i) source.data()[i] = static_cast<std::uint8_t>(i * 7 + i / 251);
-    const Picture picture{source.data(), width, height, static_cast<std::ptrdiff_t>(row_bytes), format};
+    for (std::size_t i = 0; i < stride * rows; ++i) source.data()[i] = static_cast<std::uint8_t>(i * 7 + i / 251);
+    const Picture picture{source.data(), width, height, static_cast<std::ptrdiff_t>(stride), format};
     test::on_each_target([&] {
       Histogram histogram;
-      const std::vector<int> reads = source.reads_during([&] { ingest_picture(picture, planes, &histogram); });
+      const std::vector<int> reads = source.reads_during([&] { ingest->run(picture, planes, &histogram); });
       EXPECT_EQ(reads, std::vector<int>(reads.size(), 1)) << static_cast<int>(format);
       EXPECT_TRUE(source.forwards()) << static_cast<int>(format);
     });
-    std::vector<std::uint8_t> copy(row_bytes * rows);
-    const std::vector<int> reads = source.reads_during([&] { ingest_picture(picture, planes, nullptr, copy.data()); });
+    std::vector<std::uint8_t> copy(stride * rows);
+    const std::vector<int> reads = source.reads_during([&] { ingest->run(picture, planes, nullptr, copy.data()); });
     EXPECT_EQ(reads, std::vector<int>(reads.size(), 1)) << "with a copy, " << static_cast<int>(format);
     EXPECT_TRUE(std::equal(copy.begin(), copy.end(), source.data()));
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -21,6 +22,13 @@ Picture picture_of(const cv::Mat& memory, int height, PixelFormat format) {
   return {memory.data, memory.cols, height, static_cast<std::ptrdiff_t>(memory.step), format};
 }
 
+void ingest(const Picture& in, const IngestPlanes& out, Histogram* histogram) {
+  Arena arena;
+  Result<Ingest> stage = Ingest::create(std::max(in.width, 1), arena);
+  ASSERT_TRUE(stage.has_value());
+  stage->run(in, out, histogram);
+}
+
 struct Planes {
   Plane y, cb, cr;
   Histogram histogram{};
@@ -29,7 +37,7 @@ struct Planes {
 Planes planes_of(const Picture& picture) {
   const cv::Size size(picture.width, picture.height);
   Planes out{Plane(size), Plane(size), Plane(size)};
-  ingest_picture(picture, {view(out.y), view(out.cb), view(out.cr)}, &out.histogram);
+  ingest(picture, {view(out.y), view(out.cb), view(out.cr)}, &out.histogram);
   return out;
 }
 Planes planes_of(const cv::Mat& bgr) { return planes_of(picture_of(bgr, bgr.rows, PixelFormat::kBgr8)); }
@@ -107,7 +115,7 @@ TEST(Ingest, GreySourceIsCopied) {
   cv::RNG(12).fill(wide, cv::RNG::UNIFORM, 0, 256);
   const Plane part = wide.colRange(3, 16);
   Planes out{Plane(part.size()), Plane(part.size(), std::uint8_t{77}), Plane(part.size(), std::uint8_t{77})};
-  ingest_picture(picture_of(part, part.rows, PixelFormat::kGrey8), {view(out.y), view(out.cb), view(out.cr)}, nullptr);
+  ingest(picture_of(part, part.rows, PixelFormat::kGrey8), {view(out.y), view(out.cb), view(out.cr)}, nullptr);
   EXPECT_EQ(differing(out.y, part), 0);
   EXPECT_EQ(cv::countNonZero(out.cb != 77) + cv::countNonZero(out.cr != 77), 0);
 }
@@ -187,7 +195,7 @@ TEST(Ingest, HistogramIsThatOfTheLumaPlaneForEachFormat) {
 TEST(Ingest, EmptyPictureIsNoWork) {
   Histogram histogram;
   histogram.fill(77);
-  ingest_picture({}, {}, &histogram);
+  ingest({}, {}, &histogram);
   EXPECT_EQ(histogram, Histogram{});
 }
 

@@ -116,10 +116,10 @@ TEST(PipelineMemory, EachPartIsThereWhereItsStageIsAndNowhereElse) {
 
 TEST(PipelineMemory, PlanesAreWorkedByHand) {
   // A row of 96 bytes takes two lines of 64 and one of padding: 192; a plane 192 x 64 = 12288. Grey and mono:
-  // luma, smoothed, distance, mask; scratch, moving.
-  EXPECT_EQ(make("robust", false, false).use.bytes(MemoryPart::kPlanes), 6U * 12288);
+  // luma, smoothed, distance, mask; scratch, moving. And three lines of a mosaic, each with a margin of 64: 3 x 256.
+  EXPECT_EQ(make("robust", false, false).use.bytes(MemoryPart::kPlanes), 6U * 12288 + 768);
   // Colour: four planes more of the left view. Stereo: four of the right one, which is never looked at in colour.
-  EXPECT_EQ(make("robust", true, true).use.bytes(MemoryPart::kPlanes), 14U * 12288);
+  EXPECT_EQ(make("robust", true, true).use.bytes(MemoryPart::kPlanes), 14U * 12288 + 768);
 }
 
 }  // namespace

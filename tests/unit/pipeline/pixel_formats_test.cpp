@@ -28,7 +28,7 @@ struct Owned {
 
 Owned empty_picture(int width, int height, PixelFormat format, int padding = 0) {
   Owned made;
-  const int stride = width * bytes_per_pixel(format) + padding;
+  const int stride = static_cast<int>(row_bytes(format, width)) + padding;
   made.bytes.assign(static_cast<std::size_t>(stride) * static_cast<std::size_t>(memory_rows(format, height)), 128);
   made.picture = {made.bytes.data(), width, height, stride, format};
   return made;

@@ -394,7 +394,7 @@ TEST(BlackBox, ReducedKeepsTheMeanOfLumaOfEverySecondFrameAndIsNotExact) {
       before = pair.ordinal;
       // Luma bytes of this format, by hand, for one pixel.
       const Picture raw = scene.pair(static_cast<int>(pair.ordinal), true).right;
-      const int step = bytes_per_pixel(raw.format);
+      const int step = static_cast<int>(row_bytes(raw.format, 1));
       const int offset = raw.format == PixelFormat::kUyvy || raw.format == PixelFormat::kBgr8 ? 1 : 0;
       const auto luma = [&](int x, int y) { return raw.row(y)[x * step + offset]; };
       EXPECT_EQ(pair.right.row(10)[7], (luma(14, 20) + luma(15, 20) + luma(14, 21) + luma(15, 21) + 2) / 4);

@@ -18,7 +18,7 @@ inline SyntheticOptions small(std::uint64_t seed = 1) {
 
 inline std::uint64_t fnv1a(const Picture& p, std::uint64_t hash) {
   for (int y = 0; y < p.height; ++y) {
-    for (int i = 0; i < p.width * bytes_per_pixel(p.format); ++i) hash = (hash ^ p.row(y)[i]) * 0x100000001b3ULL;
+    for (std::size_t i = 0; i < row_bytes(p.format, p.width); ++i) hash = (hash ^ p.row(y)[i]) * 0x100000001b3ULL;
   }
   return hash;
 }
