@@ -208,7 +208,7 @@ class ScriptedCamera final : public capture::Camera {
 
   [[nodiscard]] Picture picture(std::uint32_t buffer) const noexcept override {
     return {script_.pixels_[buffer].data(), info_.width, info_.height,
-            std::ptrdiff_t{info_.width} * bytes_per_pixel(info_.format), info_.format};
+            static_cast<std::ptrdiff_t>(row_bytes(info_.format, info_.width)), info_.format};
   }
   [[nodiscard]] const std::string& failure() const noexcept override { return failure_; }
   [[nodiscard]] ClockMap clock_map() const noexcept override {

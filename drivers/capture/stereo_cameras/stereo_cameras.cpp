@@ -31,19 +31,15 @@ timespec to_timespec(std::chrono::nanoseconds span) noexcept {
   return {static_cast<time_t>(whole.count()), static_cast<long>((span - whole).count())};
 }
 
-const char* format_name(PixelFormat format) noexcept {
-  switch (format) {
-    case PixelFormat::kBgr8: return "BGR";
-    case PixelFormat::kYuyv: return "YUYV";
-    case PixelFormat::kUyvy: return "UYVY";
-    case PixelFormat::kNv12: return "NV12";
-    case PixelFormat::kGrey8: break;
-  }
-  return "grey";
-}
+// As recordings and camera.format name them.
+constexpr std::array<const char*, kPixelFormats> kFormatNames{
+    "grey8",   "bgr8",    "yuyv",   "uyvy",    "nv12",    "grey10",  "grey12", "grey16",
+    "grey10p", "grey12p", "rgb8",   "rggb8",   "grbg8",   "gbrg8",   "bggr8",  "rggb10",
+    "grbg10",  "gbrg10",  "bggr10", "rggb10p", "grbg10p", "gbrg10p", "bggr10p"};
 
 std::string delivery_text(const CameraInfo& info) {
-  return std::to_string(info.width) + 'x' + std::to_string(info.height) + ' ' + format_name(info.format);
+  return std::to_string(info.width) + 'x' + std::to_string(info.height) + ' ' +
+         kFormatNames.at(static_cast<std::size_t>(info.format));
 }
 
 std::string seconds_text(std::chrono::nanoseconds span) {
