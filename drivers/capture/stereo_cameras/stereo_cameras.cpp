@@ -37,11 +37,6 @@ constexpr std::array<const char*, kPixelFormats> kFormatNames{
     "grey10p", "grey12p", "rgb8",   "rggb8",   "grbg8",   "gbrg8",   "bggr8",  "rggb10",
     "grbg10",  "gbrg10",  "bggr10", "rggb10p", "grbg10p", "gbrg10p", "bggr10p"};
 
-std::string delivery_text(const CameraInfo& info) {
-  return std::to_string(info.width) + 'x' + std::to_string(info.height) + ' ' +
-         kFormatNames.at(static_cast<std::size_t>(info.format));
-}
-
 std::string seconds_text(std::chrono::nanoseconds span) {
   char text[32];
   (void)std::snprintf(text, sizeof text, "%.2f s", to_seconds(span));
@@ -54,14 +49,31 @@ void add(Counter& to, std::uint64_t before, std::uint64_t now) noexcept { to.set
 
 // ---- Main thread
 
-std::string StereoCameras::refusal(const CameraInfo& info, const CameraInfo& other) const {
+std::string delivery_text(const CameraInfo& info) {
+  return std::to_string(info.width) + 'x' + std::to_string(info.height) + ' ' +
+         kFormatNames.at(static_cast<std::size_t>(info.format));
+}
+
+SourceInfo source_info(const StereoCameras::Config& config, const CameraInfo& camera) {
+  SourceInfo info;
+  info.name = config.name;
+  info.width = camera.width;
+  info.height = camera.height;
+  info.format = camera.format;
+  info.stereo = config.stereo;
+  info.has_time = true;
+  info.period = camera.period;
+  return info;
+}
+
+std::string difference_of(const CameraInfo& info, const CameraInfo& other) {
   if (info.width != other.width || info.height != other.height || info.format != other.format) {
     return info.name + " delivers " + delivery_text(info) + ", and " + other.name + " " + delivery_text(other) +
            ": want the same of both, set camera.width, camera.height and camera.format to what both can do";
   }
-  if (info.buffers > kMostBuffers) {
-    return info.name + " has " + std::to_string(info.buffers) + " buffers: want " + std::to_string(kMostBuffers) +
-           " at most, lower camera.buffers";
+  if (info.buffers > StereoCameras::kMostBuffers) {
+    return info.name + " has " + std::to_string(info.buffers) + " buffers: want " +
+           std::to_string(StereoCameras::kMostBuffers) + " at most, lower camera.buffers";
   }
   return {};
 }
@@ -84,19 +96,13 @@ StereoCameras::StereoCameras(Open open, const Config& config)
   wanted_ = left.camera ? left.camera->info() : right.camera->info();
   for (const Eye& each : eyes_) {
     if (!each.camera) continue;
-    const std::string wrong = refusal(each.camera->info(), wanted_);
+    const std::string wrong = difference_of(each.camera->info(), wanted_);
     if (!wrong.empty()) throw std::runtime_error(wrong);
   }
   if (wanted_.period.count() <= 0) {
     throw std::runtime_error(wanted_.name + ": does not say how many frames a second it delivers: set camera.fps");
   }
-  info_.name = config_.name;
-  info_.width = wanted_.width;
-  info_.height = wanted_.height;
-  info_.format = wanted_.format;
-  info_.stereo = config_.stereo;
-  info_.has_time = true;
-  info_.period = wanted_.period;
+  info_ = source_info(config_, wanted_);
   config_.timeout = std::max(config_.timeout, kLeastTimeoutPeriods * wanted_.period);
   phase_ = PhaseEstimator(wanted_.period);
   const bool sequenced = wanted_.counts_lost && (!right.camera || right.camera->info().counts_lost);
@@ -465,10 +471,7 @@ void StereoCameras::reopen(Side side, std::vector<SourceNote>& notes) {
   try {
     std::unique_ptr<Camera> camera = open_(side);
     const CameraInfo& info = camera->info();
-    CameraInfo wanted = wanted_;
-    wanted.name = "the pipeline wants";
-    wrong = refusal(info, wanted);
-    if (!wrong.empty()) {
+    if (!difference_of(info, wanted_).empty()) {
       wrong = info.name + ": came back with " + delivery_text(info) + ", the pipeline was made for " +
               delivery_text(wanted_) + ": refused, plug in the camera that was there, or start anew";
     } else {

@@ -136,7 +136,6 @@ class StereoCameras final : public LiveSource {
 
   [[nodiscard]] Eye& eye(Side side) noexcept { return eyes_[static_cast<std::size_t>(side)]; }
   [[nodiscard]] MonotonicTime now() const noexcept { return config_.now(); }
-  [[nodiscard]] std::string refusal(const CameraInfo& info, const CameraInfo& other) const;
 
   // Capture thread.
   void requeue(PairOutlet& outlet) noexcept;
@@ -194,5 +193,12 @@ class StereoCameras final : public LiveSource {
   std::atomic<std::int64_t> drift_ppb_{kUnknown};
   static constexpr std::int64_t kUnknown = INT64_MIN;
 };
+
+/// "640x480 yuyv".
+[[nodiscard]] std::string delivery_text(const CameraInfo& info);
+/// Why the two cannot make pairs, with the way out; empty: they can.
+[[nodiscard]] std::string difference_of(const CameraInfo& info, const CameraInfo& other);
+/// What a source of cameras like this one is.
+[[nodiscard]] SourceInfo source_info(const StereoCameras::Config& config, const CameraInfo& camera);
 
 }  // namespace stereotrack::capture
