@@ -37,8 +37,8 @@ struct SourceNote {
 
 /// One camera of a source, since the start, whichever device it was.
 struct CameraFigures {
-  bool silent = false;          ///< now: it gives no frames, or is gone
-  std::uint64_t frames = 0;     ///< Camera::Counters, the four
+  bool silent = false;       ///< now: it gives no frames, or is gone
+  std::uint64_t frames = 0;  ///< Camera::Counters, the four
   std::uint64_t damaged = 0;
   std::uint64_t lost = 0;
   std::uint64_t late = 0;

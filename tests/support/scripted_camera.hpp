@@ -82,6 +82,12 @@ class SensorScript {
     refusal_ = std::move(why);
   }
 
+  /// Why it opens and does not begin to stream; empty: it does.
+  void refuse_start(std::string why) {
+    const std::lock_guard lock(mutex_);
+    start_refusal_ = std::move(why);
+  }
+
   [[nodiscard]] bool is_open() const {
     const std::lock_guard lock(mutex_);
     return descriptor_ >= 0;
@@ -120,6 +126,7 @@ class SensorScript {
   mutable std::mutex mutex_;
   capture::CameraInfo info_;
   std::string refusal_;
+  std::string start_refusal_;
   int descriptor_ = -1;
   bool is_lost_ = false;
   std::uint64_t late_ = 0;
@@ -172,6 +179,7 @@ class ScriptedCamera final : public capture::Camera {
   [[nodiscard]] const capture::CameraInfo& info() const noexcept override { return info_; }
   void start() override {
     const std::lock_guard lock(script_.mutex_);
+    if (!script_.start_refusal_.empty()) throw std::runtime_error(script_.start_refusal_);
     std::fill(script_.states_.begin(), script_.states_.end(), SensorScript::State::kDriver);
   }
   [[nodiscard]] int descriptor() const noexcept override { return descriptor_; }

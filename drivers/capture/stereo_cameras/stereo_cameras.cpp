@@ -102,6 +102,19 @@ StereoCameras::StereoCameras(Open open, const Config& config)
   if (wanted_.period.count() <= 0) {
     throw std::runtime_error(wanted_.name + ": does not say how many frames a second it delivers: set camera.fps");
   }
+  for (const Side side : kSides) {
+    Eye& each = eye(side);
+    if (!each.camera) continue;
+    each.buffers = each.camera->info().buffers;
+    try {
+      each.camera->start();
+      each.joined = now();
+    } catch (const std::runtime_error& error) {
+      failures[static_cast<std::size_t>(side)] = error.what();
+      each.camera.reset();
+    }
+  }
+  if (!left.camera && !right.camera) throw std::runtime_error(failures[0]);
   info_ = source_info(config_, wanted_);
   config_.timeout = std::max(config_.timeout, kLeastTimeoutPeriods * wanted_.period);
   phase_ = PhaseEstimator(wanted_.period);
@@ -114,12 +127,7 @@ StereoCameras::StereoCameras(Open open, const Config& config)
     Eye& each = eye(side);
     if (side == Side::kRight && !config_.stereo) continue;
     each.back_off = config_.back_off_first;
-    if (each.camera) {
-      each.buffers = each.camera->info().buffers;
-      each.camera->start();
-      each.joined = now();
-      continue;
-    }
+    if (each.camera) continue;
     each.silent.store(true, std::memory_order_relaxed);
     each.losses.add();
     each.is_wanted = true;

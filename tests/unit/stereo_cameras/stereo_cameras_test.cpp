@@ -131,6 +131,20 @@ TEST(StereoCameras, WithoutTheRightCameraItBeginsInMonoAndSaysSoOnce) {
   EXPECT_TRUE(rig.cameras->figures().cameras[1].silent);
 }
 
+TEST(StereoCameras, ACameraThatOpensAndDoesNotStreamIsTriedAgain) {
+  CameraRig rig(config());
+  rig.right.refuse_start("right-device: does not stream: another program has it");
+  rig.open();
+  EXPECT_FALSE(rig.right.is_open());
+  const std::vector<SourceNote> notes = rig.tend();
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_NE(notes[0].text.find("another program has it"), std::string::npos) << notes[0].text;
+  EXPECT_EQ(play(rig, 1, 20, Who::kLeft).size(), 20U);
+  rig.right.refuse_start("");
+  EXPECT_EQ(play(rig, 21, 100).back().right, 100U);
+  EXPECT_FALSE(rig.cameras->figures().cameras[1].silent);
+}
+
 TEST(StereoCameras, WithNeitherCameraItDoesNotBegin) {
   CameraRig rig(config());
   rig.left.refuse("left-device: not there");
