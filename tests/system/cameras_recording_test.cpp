@@ -87,7 +87,7 @@ TEST_P(CamerasRecording, OfALiveRunReplaysToTheByteMonoFramesIncluded) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, CamerasRecording, testing::Values(1, 2, 4),
-                         [](const auto& info) { return std::string(kSceneFormats[info.param].name); });
+                         [](const auto& one) { return std::string(kSceneFormats[one.param].name); });
 
 }  // namespace
 }  // namespace stereotrack::test
