@@ -45,7 +45,10 @@ struct CameraFigures {
   std::uint64_t losses = 0;         ///< times that it was gone, or silent alone
   std::uint64_t reopened = 0;       ///< times that another was opened in its place
   std::uint64_t open_failures = 0;  ///< times that none could be
-  std::uint64_t back_off_ms = 0;    ///< now: between two attempts; 0: none is wanted
+  std::uint64_t missed = 0;         ///< trigger::PulseMatcher::Counters, these three
+  std::uint64_t doubled = 0;
+  std::uint64_t stray = 0;
+  std::uint64_t back_off_ms = 0;  ///< now: between two attempts; 0: none is wanted
 };
 
 /// What a source of cameras counts; a film counts nothing.
@@ -61,6 +64,9 @@ struct SourceFigures {
   std::uint64_t disagreed = 0;
   std::uint64_t clock_steps = 0;
   std::uint64_t waiting_high = 0;
+  bool has_trigger = false;                       ///< pulses are told
+  bool trigger_silent = false;                    ///< now: frames come, and no pulses
+  std::uint64_t pulses = 0;                       ///< number of the last one
   std::uint64_t mono_pairs = 0;                   ///< put with an empty right picture
   std::uint64_t notes_lost = 0;                   ///< changes of state that the log lacks
   std::optional<std::chrono::nanoseconds> phase;  ///< by how much the right exposes later, within half a period

@@ -88,6 +88,15 @@ void add_cameras(Text& text, const capture::SourceFigures& figures) {
   text.family("camera_back_off_milliseconds", "gauge", "Time between two attempts to open it; 0: none is needed.");
   of_each("", &F::back_off_ms);
 
+  if (figures.has_trigger) {
+    text.counter("trigger_pulses_total", "Number of the last pulse that was told.", figures.pulses);
+    text.gauge("trigger_silent", "1: frames come, and no pulses.", figures.trigger_silent ? 1 : 0);
+    text.family("camera_exposures_total", "counter", "Exposures that do not fit the pulses, by reason.");
+    of_each(",fault=\"missed\"", &F::missed);
+    of_each(",fault=\"doubled\"", &F::doubled);
+    of_each(",fault=\"stray\"", &F::stray);
+  }
+
   text.family("pairing_total", "counter", "Pairs formed, and frames that are part of none, by reason.");
   text.value("{verdict=\"paired\"}", figures.paired);
   text.value("{verdict=\"missing_left\"}", figures.missing_left);

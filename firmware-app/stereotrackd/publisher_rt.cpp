@@ -308,6 +308,7 @@ void Publisher::judge_health() noexcept {
   cameras_ = source_.figures();
   tell_if(cameras_.cameras[0].silent, telemetry::kHealthLeftSilent);
   tell_if(cameras_.cameras[1].silent, telemetry::kHealthRightSilent);
+  tell_if(cameras_.trigger_silent, telemetry::kHealthTriggerFailed);
   tell_if(vitals_.skew_over.get() != skew_over_seen_, telemetry::kHealthSkew);
   tell_if(vitals_.exposures_differ.get() != exposures_differ_seen_, telemetry::kHealthExposuresDiffer);
   skew_over_seen_ = vitals_.skew_over.get();

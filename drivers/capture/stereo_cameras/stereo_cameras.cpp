@@ -78,8 +78,8 @@ std::string difference_of(const CameraInfo& info, const CameraInfo& other) {
   return {};
 }
 
-StereoCameras::StereoCameras(Open open, const Config& config)
-    : open_(std::move(open)), config_(config), phase_(std::chrono::seconds(1)) {
+StereoCameras::StereoCameras(Open open, const Config& config, std::unique_ptr<trigger::Trigger> trigger)
+    : open_(std::move(open)), config_(config), trigger_(std::move(trigger)), phase_(std::chrono::seconds(1)) {
   if (config_.now == nullptr) config_.now = &read_monotonic;
   std::array<std::string, 2> failures;
   for (const Side side : kSides) {
@@ -123,6 +123,13 @@ StereoCameras::StereoCameras(Open open, const Config& config)
       trigger::Pairer::create({.period = wanted_.period, .tolerance = config_.tolerance, .sequenced = sequenced});
   if (!pairer.has_value()) throw std::runtime_error("camera.tolerance: want more than 0 and at most 0.5");
   pairer_ = *pairer;
+  if (trigger_) {
+    config_.triggered = true;
+    const auto matcher = trigger::PulseMatcher::create(
+        {.period = wanted_.period, .delay = config_.pulse_delay, .tolerance = std::min(config_.tolerance, 0.45)});
+    if (!matcher.has_value()) throw std::runtime_error("the trigger's delay: want no less than 0");
+    matcher_ = *matcher;
+  }
   for (const Side side : kSides) {
     Eye& each = eye(side);
     if (side == Side::kRight && !config_.stereo) continue;
@@ -186,16 +193,56 @@ void StereoCameras::adopt(PairOutlet& outlet) noexcept {
     each.late_comer = true;
     each.heard.reset();
     each.joined = now();
-    const Eye& partner = eye(other(side));
     settle(outlet, pairer_->restart());
-    pairer_->set_sequenced(each.camera->info().counts_lost &&
-                           (partner.camera ? partner.camera->info() : each.camera->info()).counts_lost);
+    pairer_->set_sequenced(pulses_trusted_ || both_count());
+    if (matcher_) matcher_->restart(side);
     (void)distances_.push({CaptureTime(), {}, true});
     // What fits has to show first; until then left pictures go on alone.
     unmatched_ = true;
     patience_ = 1;
     last_pair_ = each.joined;
   }
+}
+
+/// The cameras that there are count what they lose.
+bool StereoCameras::both_count() const noexcept {
+  return std::all_of(eyes_.begin(), eyes_.end(),
+                     [](const Eye& each) { return !each.camera || each.camera->info().counts_lost; });
+}
+
+void StereoCameras::trust_pulses(PairOutlet& outlet, bool trust) noexcept {
+  if (trust == pulses_trusted_) return;
+  pulses_trusted_ = trust;
+  // Numbers of pulses and of frames do not compare: what fits has to show anew.
+  settle(outlet, pairer_->restart());
+  last_pair_ = now();
+  pairer_->set_sequenced(trust || both_count());
+}
+
+void StereoCameras::take_pulses(PairOutlet& outlet) noexcept {
+  trigger::Trigger::Pulse pulse;
+  while (trigger_ && trigger_->take(pulse)) {
+    false_alarms_ = 0;
+    last_pulse_ = now();
+    matcher_->pulse(pulse.number, CaptureTime(pulse.time.time_since_epoch()));
+    pulses_.set(matcher_->pulses());
+    trust_pulses(outlet, true);
+    if (!trigger_silent_.load(std::memory_order_relaxed)) continue;
+    trigger_silent_.store(false, std::memory_order_relaxed);
+    tell(Change::kPulses, Side::kLeft);
+  }
+}
+
+/// Frames come that nobody says to have asked for: better pairs by their times alone than none.
+void StereoCameras::look_for_pulses(PairOutlet& outlet, MonotonicTime now) noexcept {
+  if (!matcher_ || !armed_ || trigger_silent_.load(std::memory_order_relaxed)) return;
+  const MonotonicTime since = std::max(last_pulse_, *armed_);
+  const bool frames_come = std::any_of(
+      eyes_.begin(), eyes_.end(), [&](const Eye& each) { return each.heard && *each.heard - since > config_.timeout; });
+  if (!frames_come) return;
+  trigger_silent_.store(true, std::memory_order_relaxed);
+  trust_pulses(outlet, false);
+  tell(Change::kNoPulses, Side::kLeft, now - since);
 }
 
 /// The camera is given up: nothing is taken from it any more. Its frames that wait for a partner are handed back.
@@ -224,7 +271,7 @@ void StereoCameras::retire() noexcept {
 }
 
 void StereoCameras::wait(MonotonicTime until) noexcept {
-  std::array<pollfd, 2> fds{};
+  std::array<pollfd, 3> fds{};
   nfds_t count = 0;
   std::chrono::nanoseconds most = until - now();
   for (const Eye& each : eyes_) {
@@ -233,6 +280,7 @@ void StereoCameras::wait(MonotonicTime until) noexcept {
     // A driver without buffers has no frame to wake us with when the frame loop gives some back.
     if (each.held + 1 >= each.buffers) most = std::min(most, info_.period / 4);
   }
+  if (trigger_ && trigger_->descriptor() >= 0) fds[count++] = {trigger_->descriptor(), POLLIN, 0};
   if (most.count() < 0) most = {};
   // A descriptor that is readable and has nothing must not take the core.
   if (false_alarms_ > 2) {
@@ -310,7 +358,16 @@ void StereoCameras::arrived(PairOutlet& outlet, Side side, const SensorFrame& fr
   if (side == Side::kRight && partner.heard && !is_out(Side::kLeft))
     (void)distances_.push({time, time - partner.last, false});
 
-  settle(outlet, pairer_->push(side, {time, frame.sequence, frame.buffer}));
+  std::uint64_t sequence = frame.sequence;
+  if (pulses_trusted_) {
+    const trigger::PulseMatcher::Found found = matcher_->frame(side, time);
+    if (found.kind != trigger::PulseMatcher::Kind::kAnswer) {
+      give_back(side, frame.buffer);
+      return;
+    }
+    sequence = found.number;
+  }
+  settle(outlet, pairer_->push(side, {time, sequence, frame.buffer}));
   if (is_out(other(side))) {
     settle(outlet, pairer_->give_up_before(time + std::chrono::nanoseconds(1)));
     return;
@@ -358,9 +415,10 @@ void StereoCameras::look_for_silence(PairOutlet& outlet, MonotonicTime now) noex
     if (now - since <= config_.timeout) continue;
     ++quiet_ones;
     longest = std::max(longest, now - since);
-    // Frames that the other one had meanwhile were triggered; this one missed them.
-    const bool alone =
+    // Frames that the other one had meanwhile were triggered, as pulses say themselves; this one missed them.
+    const bool others =
         partner.camera && !partner.ending && partner.heard && *partner.heard - since > config_.timeout / 2;
+    const bool alone = others || (matcher_ && last_pulse_ - since > config_.timeout / 2);
     if (config_.triggered && !alone) {
       each.silent.store(true, std::memory_order_relaxed);
     } else {
@@ -391,6 +449,12 @@ void StereoCameras::count() noexcept {
     add(each.damaged, each.before.damaged, now.damaged);
     add(each.lost, each.before.lost, now.lost);
     add(each.late, each.before.late, now.late);
+    if (!matcher_) continue;
+    const trigger::PulseMatcher::Counters& exposures =
+        matcher_->counters(&each == eyes_.data() ? Side::kLeft : Side::kRight);
+    each.missed.set(exposures.missed);
+    each.doubled.set(exposures.doubled);
+    each.stray.set(exposures.stray);
   }
   const trigger::Pairer::Counters& c = pairer_->counters();
   const std::array<std::uint64_t, 9> pairing{c.paired,    c.missing_left, c.missing_right,
@@ -405,6 +469,7 @@ LiveSource::Step StereoCameras::step(PairOutlet& outlet, MonotonicTime until) no
   adopt(outlet);
   wait(until);
   requeue(outlet);
+  take_pulses(outlet);  // before the frames that they asked for
   // In turns, so that neither side's frames pile up before the pairer.
   bool more = true;
   for (std::size_t round = 0; more && round < kMostBuffers; ++round) {
@@ -414,6 +479,7 @@ LiveSource::Step StereoCameras::step(PairOutlet& outlet, MonotonicTime until) no
   }
   const MonotonicTime at = now();
   look_for_silence(outlet, at);
+  look_for_pulses(outlet, at);
   look_for_fits(at);
   retire();
   count();
@@ -446,6 +512,14 @@ void StereoCameras::say(const Event& event, std::vector<SourceNote>& notes) {
                            ", the last ones were " + std::to_string(event.span.count() / 1000) +
                            " us apart; goes on with the left camera alone, in mono: synchronise them, or raise "
                            "camera.tolerance"});
+      break;
+    case Change::kNoPulses:
+      notes.push_back({Weight::kWarning, "trigger_silent", "",
+                       "trigger: frames come, and no pulse was told for " + seconds_text(event.span) +
+                           ": pairs are formed without: check its line"});
+      break;
+    case Change::kPulses:
+      notes.push_back({Weight::kNotice, "trigger_back", "", "trigger: pulses are told again"});
       break;
     case Change::kMatched:
       notes.push_back({Weight::kNotice, "cameras_fit", "", "cameras: left and right pictures fit again"});
@@ -544,6 +618,9 @@ SourceFigures StereoCameras::figures() const noexcept {
                       .losses = each.losses.get(),
                       .reopened = each.reopened.get(),
                       .open_failures = each.open_failures.get(),
+                      .missed = each.missed.get(),
+                      .doubled = each.doubled.get(),
+                      .stray = each.stray.get(),
                       .back_off_ms = each.back_off_ms.get()};
   }
   out.paired = pairing_[0].get();
@@ -555,6 +632,9 @@ SourceFigures StereoCameras::figures() const noexcept {
   out.disagreed = pairing_[6].get();
   out.clock_steps = pairing_[7].get();
   out.waiting_high = pairing_[8].get();
+  out.has_trigger = matcher_.has_value();
+  out.trigger_silent = trigger_silent_.load(std::memory_order_relaxed);
+  out.pulses = pulses_.get();
   out.mono_pairs = mono_pairs_.get();
   out.notes_lost = events_.refused();
   const std::int64_t phase = phase_ns_.load(std::memory_order_relaxed);

@@ -15,6 +15,8 @@
 #include "drivers/capture/live_source.hpp"
 #include "drivers/capture/stereo_cameras/phase.hpp"
 #include "drivers/trigger/pairer.hpp"
+#include "drivers/trigger/pulse_matcher.hpp"
+#include "drivers/trigger/trigger.hpp"
 #include "pipeline/core/counter.hpp"
 #include "pipeline/core/queue.hpp"
 
@@ -38,6 +40,9 @@ namespace stereotrack::capture {
 /// * silence counts from the first frame that came from any camera on. Where frames come `triggered`, both silent is no
 ///   fault of theirs: it is told, and they are kept;
 /// * both deliver and no two fit for `timeout`: likewise mono, until two fit. Late right frames make it more patient;
+/// * with a trigger::Trigger, frames are counted against its pulses, and the number of a frame's pulse is what two must
+///   have in common: a missed or doubled exposure breaks no pair. Frames that no pulse asked for are given back. While
+///   no pulse is told and frames come, they pair without;
 /// * a camera that comes back and delivers another size or format is refused.
 ///
 /// A lost camera is found within 0.1 s; pairs come again with the third frame of the one that is back, where sequences
@@ -59,12 +64,14 @@ class StereoCameras final : public LiveSource {
     std::chrono::nanoseconds timeout{std::chrono::milliseconds(500)};
     std::chrono::nanoseconds back_off_first{std::chrono::milliseconds(500)};
     std::chrono::nanoseconds back_off_most{std::chrono::seconds(10)};
+    std::chrono::nanoseconds pulse_delay{0};    ///< from a trigger's pulse to the middle of the exposure it asks for
     MonotonicTime (*now)() noexcept = nullptr;  ///< null: CLOCK_MONOTONIC. Tests bring a time of their own
   };
 
   /// Opens and starts them. One that cannot be opened is tried again by tend(). Throws std::runtime_error: none can be,
   /// they do not deliver the same, or no rate is known.
-  StereoCameras(Open open, const Config& config);
+  /// `trigger`: what tells of pulses; null: nobody.
+  StereoCameras(Open open, const Config& config, std::unique_ptr<trigger::Trigger> trigger = nullptr);
   ~StereoCameras() override;
   StereoCameras(const StereoCameras&) = delete;
   StereoCameras& operator=(const StereoCameras&) = delete;
@@ -80,7 +87,7 @@ class StereoCameras final : public LiveSource {
   using Side = trigger::Side;
 
   /// What the capture thread tells the service thread; small, so that it is told without memory.
-  enum class Change : std::uint8_t { kHeard, kBothSilent, kBothHeard, kUnmatched, kMatched };
+  enum class Change : std::uint8_t { kHeard, kBothSilent, kBothHeard, kUnmatched, kMatched, kNoPulses, kPulses };
   struct Event {
     Change change{};
     Side side{};
@@ -118,6 +125,9 @@ class StereoCameras final : public LiveSource {
     Counter lost;
     Counter late;
     Counter losses;
+    Counter missed;
+    Counter doubled;
+    Counter stray;
 
     // ---- Service thread
     bool is_wanted = false;
@@ -150,6 +160,10 @@ class StereoCameras final : public LiveSource {
   void settle(PairOutlet& outlet, const trigger::Pairer::Outcome& outcome) noexcept;
   void put(PairOutlet& outlet, const trigger::Settled& settled, bool both) noexcept;
   void look_for_silence(PairOutlet& outlet, MonotonicTime now) noexcept;
+  void take_pulses(PairOutlet& outlet) noexcept;
+  void look_for_pulses(PairOutlet& outlet, MonotonicTime now) noexcept;
+  void trust_pulses(PairOutlet& outlet, bool trust) noexcept;
+  [[nodiscard]] bool both_count() const noexcept;
   void look_for_fits(MonotonicTime now) noexcept;
   [[nodiscard]] bool is_out(Side side) const noexcept;
   [[nodiscard]] bool goes_alone() const noexcept { return is_out(Side::kRight) || unmatched_; }
@@ -171,6 +185,10 @@ class StereoCameras final : public LiveSource {
 
   // Capture thread's.
   std::optional<trigger::Pairer> pairer_;
+  std::unique_ptr<trigger::Trigger> trigger_;
+  std::optional<trigger::PulseMatcher> matcher_;     ///< with a trigger
+  MonotonicTime last_pulse_{};                       ///< when one was told
+  bool pulses_trusted_ = false;                      ///< frames are numbered by them
   std::array<Named, FramePool::kMaxSlots> named_{};  ///< by slot
   std::optional<MonotonicTime> armed_;               ///< when the first frame of all came
   MonotonicTime last_pair_{};
@@ -185,6 +203,8 @@ class StereoCameras final : public LiveSource {
 
   std::array<Counter, 9> pairing_;
   Counter mono_pairs_;
+  Counter pulses_;
+  std::atomic<bool> trigger_silent_{false};
 
   // Service thread's.
   std::vector<SourceNote> first_notes_;

@@ -32,6 +32,22 @@ inline MonotonicTime simulated_now() noexcept { return MonotonicTime(std::chrono
           .counts_lost = counts_lost};
 }
 
+/// Pulses of a script, for who asks whenever a frame comes.
+class ScriptedTrigger final : public trigger::Trigger {
+ public:
+  void give(std::uint64_t number, std::chrono::nanoseconds time) { waiting_.push_back({number, MonotonicTime(time)}); }
+  [[nodiscard]] int descriptor() const noexcept override { return -1; }
+  [[nodiscard]] bool take(Pulse& pulse) noexcept override {
+    if (told_ == waiting_.size()) return false;
+    pulse = waiting_[told_++];
+    return true;
+  }
+
+ private:
+  std::vector<Pulse> waiting_;
+  std::size_t told_ = 0;
+};
+
 /// The number that the picture's pixels bear; 0 and a failure: they do not agree.
 [[nodiscard]] inline std::uint64_t number_of(const Picture& picture) {
   std::uint64_t first = 0;
@@ -61,6 +77,15 @@ struct CameraRig {
   void open() {
     cameras = std::make_unique<capture::StereoCameras>(
         [this](trigger::Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config_);
+  }
+  /// The trigger belongs to the source.
+  ScriptedTrigger& open_with_trigger() {
+    auto trigger = std::make_unique<ScriptedTrigger>();
+    ScriptedTrigger& pulses = *trigger;
+    cameras = std::make_unique<capture::StereoCameras>(
+        [this](trigger::Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config_,
+        std::move(trigger));
+    return pulses;
   }
   SensorScript& sensor(trigger::Side side) { return side == trigger::Side::kLeft ? left : right; }
 

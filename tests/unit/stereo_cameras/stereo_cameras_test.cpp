@@ -442,6 +442,89 @@ TEST(StereoCameras, AFrameLoopThatHoldsAllSlotsCostsPairsAndNoBuffer) {
   EXPECT_EQ(rig.left.held() + rig.right.held(), 0U);
 }
 
+TEST(StereoCameras, ExposuresThatAPulseDidNotAskForOrOneMissedMakeNoWrongPair) {
+  StereoCameras::Config pulsed = config();
+  pulsed.pulse_delay = milliseconds(2);
+  CameraRig rig(pulsed);
+  test::ScriptedTrigger& trigger = rig.open_with_trigger();
+  std::uint64_t pairs = 0;
+  for (std::uint64_t n = 1; n <= 60; ++n) {
+    rig.advance(kFramePeriod);
+    const nanoseconds pulse = kFramePeriod * static_cast<std::int64_t>(n);
+    trigger.give(n, pulse);
+    const nanoseconds middle = pulse + milliseconds(2);
+    (void)rig.left.expose({.number = n, .time = middle});
+    if (n != 20) (void)rig.right.expose({.number = n, .time = middle});
+    // A second exposure of 30, and one between 40 and 41.
+    if (n == 30) (void)rig.right.expose({.number = 1030, .time = middle + milliseconds(5)});
+    if (n == 40) (void)rig.left.expose({.number = 1040, .time = middle + milliseconds(20)});
+    if (n == 40) (void)rig.right.expose({.number = 2040, .time = middle + milliseconds(20)});
+    rig.step();
+    // Found within two frames.
+    if (n == 22) {
+      EXPECT_EQ(rig.cameras->figures().cameras[1].missed, 1U);
+    }
+    if (n == 30) {
+      EXPECT_EQ(rig.cameras->figures().cameras[1].doubled, 1U);
+    }
+    if (n == 40) {
+      EXPECT_EQ(rig.cameras->figures().cameras[0].stray + rig.cameras->figures().cameras[1].stray, 2U);
+    }
+    while (const PairLease lease = rig.pool.take_oldest()) {
+      EXPECT_EQ(number_of(lease->left), number_of(lease->right));
+      EXPECT_LE(number_of(lease->left), 60U);
+      ++pairs;
+    }
+  }
+  EXPECT_EQ(pairs, 57U);  // two to learn that numbers agree, and the 20th
+  EXPECT_EQ(rig.cameras->figures().pulses, 60U);
+  EXPECT_EQ(rig.cameras->figures().cameras[0].missed, 0U);
+  rig.step();
+  EXPECT_EQ(rig.left.held() + rig.right.held(), 0U);
+}
+
+TEST(StereoCameras, WithoutPulsesFramesPairByTheirTimesAndItIsTold) {
+  CameraRig rig(config());
+  test::ScriptedTrigger& trigger = rig.open_with_trigger();
+  std::vector<SourceNote> notes;
+  std::uint64_t pairs = 0;
+  for (std::uint64_t n = 1; n <= 120; ++n) {
+    rig.advance(kFramePeriod);
+    if (n < 40 || n >= 80) trigger.give(n, kFramePeriod * static_cast<std::int64_t>(n));
+    rig.expose_both(n);
+    rig.step();
+    while (const PairLease lease = rig.pool.take_oldest()) {
+      EXPECT_EQ(number_of(lease->left), number_of(lease->right));
+      ++pairs;
+    }
+    for (const SourceNote& note : rig.tend()) notes.push_back(note);
+    if (n == 79) {
+      EXPECT_TRUE(rig.cameras->figures().trigger_silent);
+    }
+  }
+  EXPECT_TRUE(says(notes, "trigger_silent"));
+  EXPECT_TRUE(says(notes, "trigger_back"));
+  EXPECT_EQ(notes.size(), 2U) << notes.back().text;
+  EXPECT_FALSE(rig.cameras->figures().trigger_silent);
+  EXPECT_GE(pairs, 120U - 2U - 14U - 2U);  // what was lost until it was found, and learning twice
+}
+
+TEST(StereoCameras, PulsesThatNeitherCameraAnswersAreTheirFault) {
+  CameraRig rig(config());
+  test::ScriptedTrigger& trigger = rig.open_with_trigger();
+  for (std::uint64_t n = 1; n <= 100; ++n) {
+    rig.advance(kFramePeriod);
+    trigger.give(n, kFramePeriod * static_cast<std::int64_t>(n));
+    if (n <= 10) rig.expose_both(n);
+    rig.step();
+    while (rig.pool.take_oldest()) {
+    }
+    (void)rig.tend();
+  }
+  EXPECT_GE(rig.left.opened(), 2);
+  EXPECT_GE(rig.right.opened(), 2);
+}
+
 TEST(StereoCameras, PhaseAndDriftOfFreeRunningCamerasAreTold) {
   StereoCameras::Config free = config();
   free.tolerance = 0.5;
