@@ -27,6 +27,34 @@ struct SourceConfig {
   int shift_rows = 0;               ///< rows the right picture is moved down, negative: up [px]
 };
 
+/// Whose cameras they are.
+enum class CameraDriver : unsigned char { kV4l2 };
+
+struct CameraDeviceConfig {
+  std::string device;  ///< as the driver names it
+};
+
+/// The cameras of source.name = "cameras"; no other source looks at it. See drivers/capture/stereo_cameras.
+struct CameraConfig {
+  CameraDriver driver = CameraDriver::kV4l2;
+  CameraDeviceConfig left;
+  CameraDeviceConfig right;           ///< empty: one camera, mono
+  int width = 640;                    ///< [px]
+  int height = 480;                   ///< [px]
+  std::string format = "auto";        ///< a name of the driver's
+  double fps = 30.0;                  ///< [1/s]
+  int buffers = 8;                    ///< a camera
+  double exposure_us = 0;             ///< [us]; 0: automatic
+  double gain = 0;                    ///< 1 = none; 0: automatic
+  int black_level = -1;               ///< in the driver's own unit; -1: as the driver has it
+  double readout_us = 0;              ///< [us]; 0: as the driver tells
+  bool triggered = false;             ///< frames come when a trigger asks, so silence of both is no fault
+  double timeout_ms = 500;            ///< [ms]
+  double tolerance = 0.25;            ///< of the period
+  double skew_limit_ms = 5;           ///< alarm [ms]; 0: none
+  double exposure_limit_percent = 5;  ///< alarm; 0: none
+};
+
 /// What `synthetic:NAME` draws; no other source looks at it.
 struct SyntheticConfig {
   std::uint32_t seed = 1;
@@ -178,6 +206,7 @@ struct RecordConfig {
 struct Configuration {
   std::string preset = "robust";  ///< where the values not given by the user came from
   SourceConfig source;
+  CameraConfig camera;
   SyntheticConfig synthetic;
   LatencyConfig latency;
   RealTimeConfig realtime;

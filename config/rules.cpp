@@ -60,6 +60,23 @@ std::string decided_before_it_leaves(const Configuration& c) {
          "output_ms";
 }
 
+bool has_cameras(const Configuration& c) { return c.source.name == "cameras"; }
+
+std::string cameras_have_devices(const Configuration& c) {
+  if (!has_cameras(c) || !c.camera.left.device.empty()) return {};
+  return "source.name is \"cameras\", and no left one is named: give its device, for example \"/dev/video0\"";
+}
+
+std::string cameras_differ(const Configuration& c) {
+  if (!has_cameras(c) || c.camera.right.device != c.camera.left.device) return {};
+  return quoted(c.camera.right.device) + " is both cameras: give two devices, or leave the right one out for mono";
+}
+
+std::string exposure_fits_into_a_period(const Configuration& c) {
+  if (c.camera.exposure_us * c.camera.fps < 1e6) return {};
+  return "an exposure takes longer than there is time between two frames: shorten it, or lower camera.fps";
+}
+
 /// Set by the user, not by a preset or a default.
 bool said_by_user(const Loaded& loaded, std::string_view key) {
   const auto origin = loaded.origins.find(key);
@@ -83,6 +100,9 @@ std::span<const Rule> rules() {
       {"efforts_are_known", {"shed.order"}, efforts_are_known},
       {"shed_leaves_a_gap", {"shed.below", "shed.above"}, shed_leaves_a_gap},
       {"decided_before_it_leaves", {"latency.lead_ms", "latency.output_ms"}, decided_before_it_leaves},
+      {"cameras_have_devices", {"camera.left.device"}, cameras_have_devices},
+      {"cameras_differ", {"camera.right.device", "camera.left.device"}, cameras_differ},
+      {"exposure_fits_into_a_period", {"camera.exposure_us", "camera.fps"}, exposure_fits_into_a_period},
       {"split_stays_split", {"objects.merge_depth", "objects.split_depth"}, split_stays_split},
   };
   return all;

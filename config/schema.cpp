@@ -40,8 +40,8 @@ std::vector<Key> keys_of(Configuration& c) {
       key("preset", c.preset, preset_names(), "Which preset gives the values that are not given here."),
 
       key("source.name", c.source.name, nullptr,
-          "What stereotrackd watches: synthetic:NAME, drawn into memory at start and played in real time. stereotrack "
-          "is told its source on the command line."),
+          "What stereotrackd watches: cameras, those of camera.left and camera.right; or, into memory at start and "
+          "played in real time, synthetic:NAME or a recording. stereotrack is told its source on the command line."),
       key("source.repeat", c.source.repeat,
           {{"bounce", Repeat::kBounce}, {"loop", Repeat::kLoop}, {"once", Repeat::kOnce}},
           "At the end of what stereotrackd plays from memory: go backwards, begin anew, or end."),
@@ -55,6 +55,41 @@ std::vector<Key> keys_of(Configuration& c) {
       key("source.shift_rows", c.source.shift_rows, -100, 100, "px",
           "Rows that the right picture is moved down (negative: up), for video files whose views were cut at different "
           "heights."),
+
+      key("camera.driver", c.camera.driver, {{"v4l2", CameraDriver::kV4l2}},
+          "Whose cameras they are: the kernel's, Video4Linux 2."),
+      key("camera.left.device", c.camera.left.device, nullptr,
+          "The left camera, for source.name = \"cameras\": /dev/video0, a link to it that does not change with the "
+          "order of plugging in (/dev/v4l/by-path/...), or bus:NAME, name:CARD."),
+      key("camera.right.device", c.camera.right.device, nullptr, "The right one; empty: one camera, in mono."),
+      key("camera.width", c.camera.width, 16, 8192, "px", "Width of the pictures of each camera."),
+      key("camera.height", c.camera.height, 16, 8192, "px", "Height of them."),
+      key("camera.format", c.camera.format, nullptr,
+          "How pictures lie in memory, such as grey8, yuyv, nv12, rggb10p; auto: grey, else what is cheapest to read."),
+      key("camera.fps", c.camera.fps, 0.1, 1000, "1/s", "Frames a second of each camera."),
+      key("camera.buffers", c.camera.buffers, 6, 64, "",
+          "Buffers of each camera: four pairs may be on their way, two are the driver's, the others let frames wait "
+          "for "
+          "their partners."),
+      key("camera.exposure_us", c.camera.exposure_us, 0, 1e7, "us", "Exposure of both; 0: automatic, each by itself."),
+      key("camera.gain", c.camera.gain, 0, 1000, "", "Gain of both, 1 is none; 0: automatic, each by itself."),
+      key("camera.black_level", c.camera.black_level, -1, 65535, "",
+          "Black level of both in the driver's own unit; -1: as the driver has it."),
+      key("camera.readout_us", c.camera.readout_us, 0, 1e7, "us",
+          "From the end of an exposure to the end of its frame, where the driver stamps the latter; 0: as it tells."),
+      key("camera.triggered", c.camera.triggered,
+          "Frames come only when a trigger asks for them: that neither camera gives any is told, and no fault of "
+          "theirs."),
+      key("camera.timeout_ms", c.camera.timeout_ms, 10, 60000, "ms",
+          "A camera that is silent for longer, once a frame has come, is given up and opened anew; four periods at "
+          "least. Without the right one it goes on in mono."),
+      key("camera.tolerance", c.camera.tolerance, 0.001, 0.5, "period",
+          "Left and right pictures exposed this near to each other are a pair; 0.5 for cameras that nobody "
+          "synchronises."),
+      key("camera.skew_limit_ms", c.camera.skew_limit_ms, 0, 1000, "ms",
+          "A pair whose exposures are further apart raises an alarm in health; 0: none does."),
+      key("camera.exposure_limit_percent", c.camera.exposure_limit_percent, 0, 100, "%",
+          "Exposures of a pair that differ by more of the longer one raise an alarm in health; 0: none do."),
 
       key("synthetic.seed", c.synthetic.seed, 0, 4294967295.0, "",
           "Which drawing of the scene synthetic:NAME shows; no other source looks at this section."),

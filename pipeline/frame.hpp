@@ -164,7 +164,7 @@ struct Picture {
   [[nodiscard]] bool empty() const noexcept { return data == nullptr || width <= 0 || height <= 0; }
 };
 
-/// What was exposed at one moment by both sensors. `right` is empty for a mono source.
+/// What was exposed at one moment by both sensors. `right` is empty for a mono source, and where its sensor is gone.
 /// The pixels stay valid until the source is asked for the next pair.
 struct FramePair {
   std::uint64_t ordinal = 0;                     ///< from 1, counts the source's pairs, unreadable ones too

@@ -236,12 +236,14 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
     return picture.width == setup_.width && picture.height == setup_.height &&
            fits_format(picture.format, picture.width, picture.height);
   };
-  if (!fits(pair.left) || (stereo && !fits(pair.right))) return fail(Fault::kBadSize);
+  const bool both = stereo && !pair.right.empty();
+  if (!fits(pair.left) || (both && !fits(pair.right))) return fail(Fault::kBadSize);
   if (setup_.colour && !has_colour(pair.left.format)) return fail(Fault::kBadFormat);
   dt_ = started_ ? std::max(seconds_between(last_time_, pair.capture_time), 0.0) : 0.0;
   last_time_ = pair.capture_time;
   started_ = true;
   left_out_ = leave_out;
+  sees_both_ = both;
   rejections_ = {};
   // Without it no corner is followed, and none taken up.
   const auto corners_in = [&]() -> ImageView<const std::uint8_t> {
@@ -251,22 +253,22 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
   ingest(pair);  // gray 3.1, equalisation 3.2-3.5, chroma 3.17-3.19
   ended(Stage::kIngest);
   predictions_ = tracker_->predict(dt_, corners_in());  // 3.24, 3.26, 3.27: bounds the searches below
-  find_foreground();             // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
-  ended(Stage::kForeground);     // contours, opening 3.13-3.15, blobs
-  refine_blobs();                // convex hull 3.16, level set
-  if (stereo) find_disparity();  // block matching 3.6, where something moves
+  find_foreground();           // background 3.7, difference 3.8, Sobel 3.9-3.11, threshold 3.12,
+  ended(Stage::kForeground);   // contours, opening 3.13-3.15, blobs
+  refine_blobs();              // convex hull 3.16, level set
+  if (both) find_disparity();  // block matching 3.6, where something moves
   ended(Stage::kDisparity);
   remove_shadows();  // sigma test 3.20-3.23, or stereo first
   ended(Stage::kShadow);
   const Detector::Input objects{.blobs = blobs_.blobs,
                                 .labels = blobs_.labels,
-                                .disparity = disparity_,
+                                .disparity = disparity_now(),
                                 .y = left_.y,
                                 .cb = left_.cb,
                                 .cr = left_.cr,
                                 .strength = left_.distance,
                                 .predictions = predictions_,
-                                .rectifier = rectifier()};
+                                .rectifier = both ? rectifier() : nullptr};
   for (Detector::Candidate& candidate : detector_->segment(objects)) match_whole(candidate, objects);
   const std::span<const Detection> detections = detector_->conclude(objects);
   ended(Stage::kObjects);
@@ -279,7 +281,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
   FrameResult result;
   result.ordinal = pair.ordinal;
   result.capture_time = pair.capture_time;
-  result.flags = (stereo ? 0U : kFlagMono) | (setup_.colour ? 0U : kFlagNoColour) |
+  result.flags = (both ? 0U : kFlagMono) | (setup_.colour ? 0U : kFlagNoColour) |
                  (frames_ <= config_.background.frames ? kFlagLearning : 0U) | (light_change_ ? kFlagLightChange : 0U);
   result.left_out = left_out_;
   result.tracks = tracker_->reports();
@@ -298,7 +300,7 @@ void Pipeline::ingest(const FramePair& pair) noexcept {
     equalise.run(histogram, view.y);
   };
   take(pair.left, left_, equalise_left_, pair.left_copy);
-  if (rectifier_) take(pair.right, right_, equalise_right_, pair.right_copy);
+  if (sees_both_) take(pair.right, right_, equalise_right_, pair.right_copy);
   if (background_left_) {
     smooth3x3(left_.y, left_.smooth_y);
     if (setup_.colour) {
@@ -306,10 +308,15 @@ void Pipeline::ingest(const FramePair& pair) noexcept {
       smooth3x3(left_.cr, left_.smooth_cr);
     }
   }
-  if (!rectifier_) return;
+  if (!sees_both_) return;
   if (background_right_) smooth3x3(right_.y, right_.smooth_y);
   canvases_.left.show(left_.y);
   canvases_.right.show(right_.y);
+}
+
+// Without a right picture nothing is known of this frame's.
+ImageView<const std::uint16_t> Pipeline::disparity_now() const noexcept {
+  return sees_both_ ? disparity_ : ImageView<std::uint16_t>();
 }
 
 AdaptiveBackground::Planes Pipeline::left_planes() const noexcept {
@@ -358,7 +365,7 @@ void Pipeline::foreground_from_model() noexcept {
   if (light_change_) fill(moving_, 0);
   (void)closing_->run(moving_, scratch_);
   (void)contour_fill_->run(scratch_, left_.mask);
-  if (!rectifier_) return;
+  if (!sees_both_) return;
   background_right_->distance({right_.smooth_y, {}, {}}, right_.distance);
   (void)foreground_right_->run(right_.distance, right_.mask);
   count_no_room(foreground_right_->dropped_runs());
@@ -468,8 +475,8 @@ ShadowTest::Input Pipeline::shadow_input() const noexcept {
           .cr_background = background_left_->red(),
           .distance = left_.distance,
           .labels = blobs_.labels,
-          .disparity = disparity_,
-          .disparity_background = old_disparity_};
+          .disparity = disparity_now(),
+          .disparity_background = sees_both_ ? old_disparity_ : ImageView<std::uint16_t>()};
 }
 
 // Whether the region lies where a target may be that moves, or is a small part of any: no ghost of its own.
@@ -550,7 +557,7 @@ void Pipeline::remove_shadows() noexcept {
 
 // Where single pixels tell little, because the object is small or blurred, all of its pixels are matched together.
 void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept {
-  if (!region_matcher_) return;
+  if (!sees_both_) return;
   const bool sparse = !candidate.has_depth || candidate.valid * 4 < candidate.area;
   const bool small = candidate.area <= config_.disparity.small_px;
   const bool judges_surface = background_right_ && config_.shadow.method == ShadowMethod::kStereo;
@@ -655,7 +662,7 @@ void Pipeline::learn_background() noexcept {
     if (background_disparity_) background_disparity_->restart();
   }
   background_left_->learn(left_planes(), moving_);
-  if (background_right_) background_right_->learn({right_.smooth_y, {}, {}}, right_.mask);
+  if (background_right_ && sees_both_) background_right_->learn({right_.smooth_y, {}, {}}, right_.mask);
 }
 
 }  // namespace stereotrack

@@ -46,7 +46,7 @@ struct StageObserver {
 
 /// What is true of a frame beside its targets. Bits.
 enum FrameFlag : std::uint32_t {
-  kFlagMono = 1,         ///< no second view: 2-D tracks only
+  kFlagMono = 1,         ///< no second view, or none in this frame: 2-D tracks, depth coasts
   kFlagNoColour = 2,     ///< grey source: the chroma tests did not run
   kFlagLearning = 4,     ///< fewer than background.frames frames seen so far
   kFlagLightChange = 8,  ///< so much changed at once that the background starts anew
@@ -83,7 +83,9 @@ class Pipeline {
   /// Faults: those of the stages. The arena must outlive the pipeline.
   [[nodiscard]] static Result<Pipeline> create(const PipelineConfig& config, const Setup& setup, Arena& arena) noexcept;
 
-  /// Pixels are read until Stage::kIngest has ended, and not after. Faults, state untouched: kBadSize, kBadFormat.
+  /// Pixels are read until Stage::kIngest has ended, and not after. An empty right picture where there are two views (a
+  /// camera is gone) makes a frame in mono: new targets have no depth, known ones keep theirs for a while, predicted.
+  /// Faults, state untouched: kBadSize, kBadFormat.
   [[nodiscard]] Result<FrameResult> run(const FramePair& pair, EffortBits leave_out = 0) noexcept;
 
   /// Everything that crosses frames as one block (pipeline/core/state_block.hpp): a pipeline of the same configuration
@@ -150,6 +152,7 @@ class Pipeline {
   [[nodiscard]] bool fits_at(double disparity, const Rect& roi, double cost) noexcept;
   void learn_background() noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
+  [[nodiscard]] ImageView<const std::uint16_t> disparity_now() const noexcept;
   [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;
   [[nodiscard]] RegionMatch match_region(CanvasPair& pair, LazyCanvas& right_moving, const Rect& roi,
                                          const RegionMatcher::Search& search) noexcept;
@@ -160,6 +163,7 @@ class Pipeline {
   bool started_ = false;
   bool light_change_ = false;
   EffortBits left_out_ = 0;  ///< in this frame
+  bool sees_both_ = false;   ///< in this frame: there are two views
   int frames_ = 0;           ///< seen, counted to one more than background.frames
   int full_range_ = 0;
   CaptureTime last_time_{};

@@ -58,6 +58,7 @@ class Camera {
     std::uint64_t damaged = 0;  ///< of these
     std::uint64_t lost = 0;     ///< gaps in the sequence
     std::uint64_t late = 0;     ///< frames whose driver had no buffer to fill, where it tells
+    std::uint64_t steps = 0;    ///< of its clock, which no wrap-around explains: times go on from arrivals
   };
 
   Camera() = default;

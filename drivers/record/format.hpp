@@ -58,7 +58,7 @@ struct FrameMeta {
   std::int64_t capture_ns = 0;
   std::int64_t skew_ns = 0;
   std::uint32_t has_skew = 0;
-  std::uint32_t flags = 0;   ///< FrameResult::flags, so that a reduced recording has them
+  std::uint32_t flags = 0;   ///< FrameResult::flags, so that a reduced recording has them; kFlagMono: no right picture
   std::uint32_t shed = 0;    ///< FrameDecisions
   std::uint32_t tracks = 0;  ///< targets that the frame had; the first kMostTrackNotes are noted
   std::array<std::uint32_t, kStages> stage_us{};

@@ -167,7 +167,9 @@ capture::Next RecordingSource::next(FramePair& out) noexcept {
     return Picture{data, about_.width, about_.height, stride, about_.format};
   };
   out.left = picture(pixels);
-  if (about_.stereo) out.right = picture(pixels + picture_bytes(about_.format, about_.width, about_.height));
+  // Where the run had no right picture, what lies in its place means nothing.
+  const bool both = about_.stereo && (meta.flags & kFlagMono) == 0;
+  if (both) out.right = picture(pixels + picture_bytes(about_.format, about_.width, about_.height));
   return capture::Next::kPair;
 }
 

@@ -111,6 +111,9 @@ class Pairer {
   /// The sensors' rate has changed, from the next frame on. Faults: kBadConfig, nothing changed.
   [[nodiscard]] Result<void> set_period(std::chrono::nanoseconds period) noexcept;
 
+  /// Another sensor may count otherwise. With restart(), before its first frame.
+  void set_sequenced(bool sequenced) noexcept { config_.sequenced = sequenced; }
+
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   [[nodiscard]] std::size_t waiting() const noexcept { return waiting_count_; }
 

@@ -55,9 +55,10 @@ void read_calibration(const std::string& path, const calibration::ReadOptions& o
   rig.unit_m = calibration::unit_m(read.format).value_or(0);
 }
 
-void check_rig(Rig& rig) {
+void check_rig(Rig& rig) { check_rig(rig, rig.source->info()); }
+
+void check_rig(Rig& rig, const capture::SourceInfo& info) {
   const config::Configuration& configuration = rig.configuration();
-  const capture::SourceInfo& info = rig.source->info();
   if (configuration.calibration.unit_m > 0) rig.unit_m = configuration.calibration.unit_m;
   config::check_metres(rig.loaded, rig.unit_m);
   if (rig.calibration) calibration::check_size(*rig.calibration, info.width, info.height, rig.calibration_name);

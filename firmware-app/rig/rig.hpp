@@ -48,7 +48,8 @@ void open_scene(const std::string& name, Rig& rig);
 /// The calibration of a stereo source.
 void read_calibration(const std::string& path, const calibration::ReadOptions& options, Rig& rig);
 
-/// calibration.unit_m, keys in metres, and the size of the pictures.
+/// calibration.unit_m, keys in metres, and the size of the pictures; of a source that is not the rig's own, of `info`.
+void check_rig(Rig& rig, const capture::SourceInfo& info);
 void check_rig(Rig& rig);
 
 /// The pipeline for what a source delivers; `calibration` is null for mono. Throws std::runtime_error with the stage's

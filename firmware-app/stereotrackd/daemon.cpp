@@ -115,6 +115,8 @@ Daemon::Daemon(Parts parts)
   publishing.late_after = from_ms(configuration.latency.late_ms);
   publishing.awake = from_ms(configuration.latency.awake_ms);
   publishing.pool_slots = parts.pool_slots;
+  publishing.skew_limit = from_ms(configuration.camera.skew_limit_ms);
+  publishing.exposure_limit = configuration.camera.exposure_limit_percent / 100;
   auto publisher = Publisher::create(publishing, std::move(parts.plan), lines_, pool_, notices_, *mailbox_, bell_,
                                      *source_, *vitals_);
   if (!publisher.has_value()) {

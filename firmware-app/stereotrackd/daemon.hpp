@@ -85,6 +85,14 @@ class Daemon {
   [[nodiscard]] record::BlackBox* black_box() noexcept { return box_.get(); }
   [[nodiscard]] const record::BlackBox* black_box() const noexcept { return box_.get(); }
 
+  /// Between start() and stop(), about every 0.1 s: the source's work that may wait (LiveSource::tend()). What the log
+  /// is to say.
+  [[nodiscard]] std::vector<capture::SourceNote> tend_source() {
+    std::vector<capture::SourceNote> notes;
+    source_->tend(notes);
+    return notes;
+  }
+
   /// SIGHUP's file was wrong.
   void count_refused_reload() noexcept { vitals_->reloads_refused.add(); }
 
@@ -92,6 +100,7 @@ class Daemon {
   [[nodiscard]] capture::FramePool::Counters pool() const noexcept { return pool_.counters(); }
   [[nodiscard]] const gpio::OutputLines& lines() const noexcept { return lines_; }
   [[nodiscard]] const capture::SourceInfo& source() const noexcept { return source_->info(); }
+  [[nodiscard]] capture::SourceFigures figures() const noexcept { return source_->figures(); }
   [[nodiscard]] const MemoryUse& memory() const noexcept { return pipeline_->memory(); }
   [[nodiscard]] std::uint64_t lost_notices() const noexcept { return notices_.refused(); }
 

@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <exception>
@@ -12,6 +13,7 @@
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/endpoint.hpp"
 #include "drivers/telemetry/session_file.hpp"
+#include "firmware-app/rig/cameras.hpp"
 #include "firmware-app/rig/rig.hpp"
 #include "firmware-app/runtime/real_time.hpp"
 #include "firmware-app/signals/set_up.hpp"
@@ -48,27 +50,77 @@ capture::Film::Repeat repeat_of(config::Repeat repeat) {
   return capture::Film::Repeat::kBounce;
 }
 
-// Opens what source.name says; the film of it is drawn into memory.
-std::unique_ptr<capture::LiveSource> open_source(Rig& rig) {
+// What a daemon would watch, for a check: nothing is drawn, no camera runs.
+class Unopened final : public capture::LiveSource {
+ public:
+  explicit Unopened(const capture::SourceInfo& info) : info_(info) {}
+  [[nodiscard]] const capture::SourceInfo& info() const noexcept override { return info_; }
+  [[nodiscard]] Step step(capture::PairOutlet&, MonotonicTime) noexcept override { return Step::kEnded; }
+  [[nodiscard]] ClockMap clock_map() const noexcept override { return {}; }
+  [[nodiscard]] const std::string& failure() const noexcept override { return failure_; }
+
+ private:
+  capture::SourceInfo info_;
+  std::string failure_;
+};
+
+void read_rig_calibration(Rig& rig, bool stereo) {
+  const std::string& file = rig.configuration().calibration.file;
+  if (!file.empty() && stereo) read_calibration(file, {}, rig);
+}
+
+std::unique_ptr<capture::LiveSource> open_live_cameras(Rig& rig, bool check) {
+  const config::CameraConfig& camera = rig.configuration().camera;
+  const bool stereo = !camera.right.device.empty();
+  if (stereo && rig.configuration().calibration.file.empty()) {
+    throw config::error_at(rig.loaded.origins, "calibration.file",
+                           "not set: two cameras need their calibration; or leave camera.right.device out for mono");
+  }
+  read_rig_calibration(rig, stereo);
+  std::unique_ptr<capture::LiveSource> source;
+  if (check) {
+    const CameraCheck found = check_cameras(rig.loaded);
+    for (const std::string& line : found.lines) std::cout << line << '\n';
+    for (const std::string& note : found.notes) log(LogLevel::kWarning, note, {{"STEREOTRACK_CAUSE", "camera"}});
+    for (std::size_t i = 1; i < found.failures.size(); ++i) log(LogLevel::kError, found.failures[i]);
+    if (!found.failures.empty()) throw std::runtime_error(found.failures[0]);
+    source = std::make_unique<Unopened>(found.info);
+  } else {
+    source = open_cameras(rig.loaded, [](const std::string& note) {
+      log(LogLevel::kWarning, note, {{"STEREOTRACK_CAUSE", "camera"}});
+    });
+  }
+  check_rig(rig, source->info());
+  return source;
+}
+
+// Opens what source.name says; the film of it is drawn into memory, unless it is only to be checked.
+std::unique_ptr<capture::LiveSource> open_source(Rig& rig, bool check) {
   const config::SourceConfig& source = rig.configuration().source;
+  if (source.name == kCameras) return open_live_cameras(rig, check);
   if (source.name.starts_with(kSynthetic)) {
     open_scene(source.name, rig);
   } else if (record::is_recording(source.name)) {
     open_recording(source.name, rig);
     if (!rig.recording->warning().empty()) log(LogLevel::kWarning, rig.recording->warning());
   } else {
-    throw config::error_at(rig.loaded.origins, "source.name",
-                           source.name.empty()
-                               ? "not set: what is to be watched? For example \"synthetic:eleven\""
-                               : "\"" + source.name + "\" is no source: want synthetic:NAME, or a recording (.strec)");
+    throw config::error_at(
+        rig.loaded.origins, "source.name",
+        source.name.empty()
+            ? "not set: what is to be watched? For example \"synthetic:eleven\""
+            : "\"" + source.name + "\" is no source: want cameras, synthetic:NAME, or a recording (.strec)");
   }
-  if (!rig.configuration().calibration.file.empty() && rig.source->info().stereo) {
-    read_calibration(rig.configuration().calibration.file, {}, rig);
-  }
+  read_rig_calibration(rig, rig.source->info().stereo);
   check_rig(rig);
-  auto film = std::make_unique<capture::Film>(
-      *rig.source, capture::Film::Config{.repeat = repeat_of(source.repeat),
-                                         .most_bytes = static_cast<std::uint64_t>(source.memory_mb) << 20});
+  const capture::Film::Config config{.repeat = repeat_of(source.repeat),
+                                     .most_bytes = static_cast<std::uint64_t>(source.memory_mb) << 20};
+  if (check) {
+    capture::SourceInfo info = rig.source->info();
+    capture::Film::check(info, config);
+    if (info.period.count() <= 0) info.period = std::chrono::nanoseconds(std::llround(1e9 / source.fps));
+    return std::make_unique<Unopened>(info);
+  }
+  auto film = std::make_unique<capture::Film>(*rig.source, config);
   rig.recording = nullptr;
   rig.source.reset();
   return film;
@@ -165,8 +217,8 @@ int run(const Arguments& arguments) {
   }
   const daemon::Inputs::Setup inputs = daemon::input_setup(configuration);
   parts.configuration = &configuration;
-  parts.source = open_source(rig);
-  parts.calibration = rig.calibration ? &*rig.calibration : nullptr;
+  parts.source = open_source(rig, arguments.check);
+  parts.calibration = rig.calibration && parts.source->info().stereo ? &*rig.calibration : nullptr;
   parts.unit_m = rig.unit_m;
   parts.plan = daemon::make_plan(configuration, rig.unit_m);
   parts.program = std::string("stereotrackd ") + STEREOTRACK_VERSION;

@@ -23,6 +23,7 @@ class Text {
   void value(const char* labels, std::uint64_t value) {
     append("stereotrack_%s%s %llu\n", name_, labels, static_cast<unsigned long long>(value));
   }
+  void number(const char* labels, double value) { append("stereotrack_%s%s %.9g\n", name_, labels, value); }
   void counter(const char* name, const char* help, std::uint64_t value_now) {
     family(name, "counter", help);
     value("", value_now);
@@ -79,6 +80,64 @@ void inputs_text(const Inputs& inputs, Text& text) {
        [&](std::size_t i) { return inputs.triggers(i); });
 }
 
+void add_cameras(Text& text, const capture::SourceFigures& figures) {
+  using Member = std::uint64_t capture::CameraFigures::*;
+  const auto of_each = [&](const char* labels, Member member) {
+    for (std::size_t i = 0; i < figures.cameras.size(); ++i) {
+      const std::string label = std::string("{camera=\"") + (i == 0 ? "left" : "right") + '"' + labels + '}';
+      text.value(label.c_str(), figures.cameras[i].*member);
+    }
+  };
+  using F = capture::CameraFigures;
+  text.family("camera_frames_total", "counter", "Frames of each camera; damaged ones are among those taken.");
+  of_each(",fate=\"taken\"", &F::frames);
+  of_each(",fate=\"damaged\"", &F::damaged);
+  of_each(",fate=\"lost\"", &F::lost);
+  of_each(",fate=\"late\"", &F::late);
+  text.family("camera_silent", "gauge", "1: it gives no frames, or is gone.");
+  text.value("{camera=\"left\"}", figures.cameras[0].silent ? 1 : 0);
+  text.value("{camera=\"right\"}", figures.cameras[1].silent ? 1 : 0);
+  text.family("camera_losses_total", "counter", "Times that it was gone, or silent alone.");
+  of_each("", &F::losses);
+  text.family("camera_reopened_total", "counter", "Times that it was opened anew.");
+  of_each("", &F::reopened);
+  text.family("camera_open_failures_total", "counter", "Times that it could not be.");
+  of_each("", &F::open_failures);
+  text.family("camera_back_off_milliseconds", "gauge", "Time between two attempts to open it; 0: none is needed.");
+  of_each("", &F::back_off_ms);
+
+  if (figures.has_trigger) {
+    text.counter("trigger_pulses_total", "Number of the last pulse that was told.", figures.pulses);
+    text.gauge("trigger_silent", "1: frames come, and no pulses.", figures.trigger_silent ? 1 : 0);
+    text.family("camera_exposures_total", "counter", "Exposures that do not fit the pulses, by reason.");
+    of_each(",fault=\"missed\"", &F::missed);
+    of_each(",fault=\"doubled\"", &F::doubled);
+    of_each(",fault=\"stray\"", &F::stray);
+  }
+
+  text.family("pairing_total", "counter", "Pairs formed, and frames that are part of none, by reason.");
+  text.value("{verdict=\"paired\"}", figures.paired);
+  text.value("{verdict=\"missing_left\"}", figures.missing_left);
+  text.value("{verdict=\"missing_right\"}", figures.missing_right);
+  text.value("{verdict=\"late\"}", figures.late);
+  text.value("{verdict=\"out_of_order\"}", figures.out_of_order);
+  text.value("{verdict=\"duplicate\"}", figures.duplicate);
+  text.value("{verdict=\"disagreed\"}", figures.disagreed);
+  text.counter("sensor_clock_steps_total", "Times that the clock of the stamps went back.", figures.clock_steps);
+  text.gauge("frames_waiting_high", "Most frames that waited for a partner.", figures.waiting_high);
+  text.counter("mono_pairs_total", "Left pictures that went on without a right one.", figures.mono_pairs);
+  text.counter("source_notes_lost_total", "Changes of state that the log lacks.", figures.notes_lost);
+  if (figures.phase) {
+    text.family("camera_phase_seconds", "gauge", "How much later the right camera exposes, within half a period.");
+    text.number("", std::chrono::duration<double>(*figures.phase).count());
+  }
+  if (figures.drift) {
+    text.family("camera_drift_ratio", "gauge",
+                "Drift of the phase in seconds a second: 0 where they are synchronised.");
+    text.number("", *figures.drift);
+  }
+}
+
 }  // namespace
 
 std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
@@ -96,6 +155,12 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
   text.gauge("pair_buffers_free_low", "Fewest free buffers of pairs.", pool.free_low);
   text.gauge("pairs_waiting_high", "Most pairs that waited for the frame loop.", pool.waiting_high);
   text.counter("notices_lost_total", "Pairs of which the publisher was not told.", daemon.lost_notices());
+
+  if (const capture::SourceFigures figures = daemon.figures(); figures.of_cameras) add_cameras(text, figures);
+  text.counter("skew_over_total", "Pairs further apart than camera.skew_limit_ms.", vitals.skew_over.get());
+  text.gauge("skew_max_microseconds", "Largest distance of the two exposures of a pair.", vitals.skew_max_us.get());
+  text.counter("exposures_differ_total", "Pairs exposed differently, over camera.exposure_limit_percent.",
+               vitals.exposures_differ.get());
 
   text.family("outputs_total", "counter", "Slots of the latency contract by how they ended, and what was refused.");
   for (std::size_t i = 0; i < kScheduleCounters.size(); ++i) {

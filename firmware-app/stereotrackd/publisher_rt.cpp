@@ -107,13 +107,33 @@ void Publisher::take_news() noexcept {
   while (notices_.pop(notice)) {
     // Read after it came: a pair that was put in a moment ago must not look as if it were to come.
     schedule_.notice(notice.ordinal, notice.capture_time, runtime::monotonic_now());
-    skews_[notice.ordinal % skews_.size()] = notice;
-    if (notice.skew) skew_max_ = std::max(skew_max_, std::chrono::abs(*notice.skew));
+    noticed_[notice.ordinal % noticed_.size()] = notice;
+    judge_exposure(notice);
   }
   if (const Outcome* outcome = mailbox_.take()) {
     const auto keep = schedule_.result(outcome->ordinal, outcome->capture_time, runtime::monotonic_now());
     if (keep) kept_[*keep] = *outcome;
   }
+}
+
+/// What two cameras that were to expose alike did.
+void Publisher::judge_exposure(const capture::PairNotice& notice) noexcept {
+  if (notice.skew) {
+    const std::chrono::nanoseconds skew = std::chrono::abs(*notice.skew);
+    vitals_.skew_max_us.set(std::max<std::uint64_t>(vitals_.skew_max_us.get(), skew.count() / 1000));
+    if (config_.skew_limit.count() > 0 && skew > config_.skew_limit) vitals_.skew_over.add();
+  }
+  if (config_.exposure_limit > 0 && notice.left.exposure && notice.right.exposure) {
+    const auto [shorter, longer] = std::minmax(*notice.left.exposure, *notice.right.exposure);
+    if (to_seconds(longer - shorter) > config_.exposure_limit * to_seconds(longer)) vitals_.exposures_differ.add();
+  }
+}
+
+/// Null: no pair, or one from long ago.
+const capture::PairNotice* Publisher::notice_of(const Output& output) const noexcept {
+  if (output.ordinal == 0) return nullptr;
+  const std::optional<capture::PairNotice>& notice = noticed_[output.ordinal % noticed_.size()];
+  return notice && notice->ordinal == output.ordinal ? &*notice : nullptr;
 }
 
 void Publisher::look_at_clocks(MonotonicTime now) noexcept {
@@ -137,9 +157,13 @@ telemetry::Live Publisher::live_of(const Output* output) const noexcept {
                           ? leaving_.left_out
                           : static_cast<EffortBits>(vitals_.efforts_left_out.get());
   live.health = health_;
-  if (output != nullptr && output->ordinal != 0) {
-    const std::optional<capture::PairNotice>& notice = skews_[output->ordinal % skews_.size()];
-    if (notice && notice->ordinal == output->ordinal) live.pair_skew = notice->skew;
+  const auto in_us = [](const std::optional<std::chrono::nanoseconds>& exposure) {
+    return exposure ? to_us(static_cast<std::uint64_t>(std::max<std::int64_t>(exposure->count(), 0))) : 0U;
+  };
+  if (const capture::PairNotice* notice = output == nullptr ? nullptr : notice_of(*output)) {
+    live.pair_skew = notice->skew;
+    live.exposure_left_us = in_us(notice->left.exposure);
+    live.exposure_right_us = in_us(notice->right.exposure);
   }
   return live;
 }
@@ -207,10 +231,7 @@ void Publisher::publish(const Output& output) noexcept {
   message.tracks = leaving_.tracks.view();
   message.ordinal = output.ordinal;
   message.capture_time = map_.to_capture(output.captured);
-  if (output.ordinal != 0) {
-    const std::optional<capture::PairNotice>& notice = skews_[output.ordinal % skews_.size()];
-    if (notice && notice->ordinal == output.ordinal) message.capture_time = notice->capture_time;
-  }
+  if (const capture::PairNotice* notice = notice_of(output)) message.capture_time = notice->capture_time;
   message.send_time = message.capture_time + (output.due - output.captured);
   message.latency = output.due - output.captured;
   message.flags = wire_flags(leaving_.flags) | telemetry::kStateAtOutput;
@@ -285,6 +306,14 @@ void Publisher::judge_health() noexcept {
     if (wrong) health |= bit;
   };
   tell_if(schedule_.status_only(), telemetry::kHealthNoPairs);
+  cameras_ = source_.figures();
+  tell_if(cameras_.cameras[0].silent, telemetry::kHealthLeftSilent);
+  tell_if(cameras_.cameras[1].silent, telemetry::kHealthRightSilent);
+  tell_if(cameras_.trigger_silent, telemetry::kHealthTriggerFailed);
+  tell_if(vitals_.skew_over.get() != skew_over_seen_, telemetry::kHealthSkew);
+  tell_if(vitals_.exposures_differ.get() != exposures_differ_seen_, telemetry::kHealthExposuresDiffer);
+  skew_over_seen_ = vitals_.skew_over.get();
+  exposures_differ_seen_ = vitals_.exposures_differ.get();
   tell_if(misses != misses_seen_, telemetry::kHealthDeadlinesMissed);
   tell_if(vitals_.efforts_left_out.get() != 0, telemetry::kHealthEffortShed);
   tell_if(lines_failed != lines_failed_seen_ || vitals_.inputs_gone.get() != 0, telemetry::kHealthLineFailed);
@@ -315,6 +344,9 @@ void Publisher::send_status(MonotonicTime now) noexcept {
   status.pairs_evicted = pool.evicted;
   status.pairs_skipped = pool.skipped;
   status.pairs_starved = pool.starved;
+  status.unpaired_left = cameras_.missing_right;
+  status.unpaired_right = cameras_.missing_left;
+  status.skew_max_us = narrow(vitals_.skew_max_us.get());
   status.outputs_on_time = outputs.on_time;
   status.outputs_predicted = outputs.predicted_late + outputs.predicted_superseded;
   status.outputs_missing = outputs.missing;
@@ -334,7 +366,6 @@ void Publisher::send_status(MonotonicTime now) noexcept {
     status.recorder_slots = narrow(box_->slots());
     status.recorder_slots_free_low = narrow(box.slots_free_low.load());
   }
-  status.skew_max_us = to_us(static_cast<std::uint64_t>(skew_max_.count()));
   status.pair_buffers = narrow(config_.pool_slots);
   status.pair_buffers_free_low = narrow(pool.free_low);
   status.pairs_waiting_high = narrow(pool.waiting_high);

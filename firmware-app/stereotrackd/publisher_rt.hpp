@@ -47,6 +47,8 @@ class Publisher {
     std::chrono::nanoseconds late_after{0};   ///< what leaves later than due by more has missed its deadline
     std::chrono::nanoseconds awake{0};        ///< before a slot leaves, not asleep: runtime::sleep_until()
     std::size_t pool_slots = 0;
+    std::chrono::nanoseconds skew_limit{0};  ///< of a pair; 0: none
+    double exposure_limit = 0;               ///< of the longer exposure, by which the shorter may differ; 0: none
   };
 
   /// The plan, lines and all that is referred to outlive it. Faults of the schedule: kBadConfig.
@@ -88,10 +90,12 @@ class Publisher {
             OutcomeMailbox& mailbox, capture::Doorbell& bell, const capture::LiveSource& source, Vitals& vitals);
 
   void take_news() noexcept;
+  void judge_exposure(const capture::PairNotice& notice) noexcept;
   void take_plan() noexcept;
   void look_at_clocks(MonotonicTime now) noexcept;
   [[nodiscard]] std::uint64_t deadline_misses() const noexcept;
   [[nodiscard]] std::uint64_t unused_pairs() const noexcept;
+  [[nodiscard]] const capture::PairNotice* notice_of(const Output& output) const noexcept;
   void between_slots(MonotonicTime now) noexcept;
   void publish(const Output& output) noexcept;
   void judge(const Output& output, std::chrono::nanoseconds late) noexcept;
@@ -131,7 +135,7 @@ class Publisher {
   std::array<Outcome, runtime::OutputSchedule::kKeeps> kept_{};
   Outcome leaving_;  ///< of the slot that leaves next, predicted
   std::array<std::byte, telemetry::kMaxMessageBytes> buffer_{};
-  std::array<std::optional<capture::PairNotice>, runtime::OutputSchedule::kMaxInFlight> skews_{};
+  std::array<std::optional<capture::PairNotice>, runtime::OutputSchedule::kMaxInFlight> noticed_{};
 
   MonotonicTime started_{};
   MonotonicTime next_status_{};
@@ -140,12 +144,14 @@ class Publisher {
   bool clock_stepped_ = false;  ///< to be told with the next message
   runtime::TaiReading tai_;
   std::optional<std::chrono::nanoseconds> send_error_;
-  std::chrono::nanoseconds skew_max_{0};  ///< |pair skew|, of pairs that have one
   std::uint32_t health_ = 0;
   std::uint64_t misses_seen_ = 0;  ///< at the last judgement
   std::uint64_t drops_seen_ = 0;
   std::uint64_t unused_told_ = 0;
   std::uint64_t recordings_seen_ = 0;
+  std::uint64_t skew_over_seen_ = 0;
+  std::uint64_t exposures_differ_seen_ = 0;
+  capture::SourceFigures cameras_;  ///< at the last judgement
   std::uint64_t lines_failed_seen_ = 0;
   telemetry::SinkCounters before_;  ///< of plans that were replaced
 };

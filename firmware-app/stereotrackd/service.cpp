@@ -112,6 +112,18 @@ void Service::log_changes(const Daemon& daemon) {
     efforts_ = now;
     log(LogLevel::kNotice, "frames leave out: " + efforts_text(now), {{"STEREOTRACK_CAUSE", "effort"}});
   }
+  const std::uint64_t health = vitals.health.get();
+  const auto log_alarm = [&](std::uint64_t bit, const char* cause, const char* begins, const char* ends) {
+    if (((health ^ health_) & bit) == 0) return;
+    const bool is_on = (health & bit) != 0;
+    log(is_on ? LogLevel::kWarning : LogLevel::kNotice, is_on ? begins : ends, {{"STEREOTRACK_CAUSE", cause}});
+  };
+  log_alarm(telemetry::kHealthSkew, "skew", "cameras: pairs are further apart than camera.skew_limit_ms",
+            "cameras: pairs are within camera.skew_limit_ms again");
+  log_alarm(telemetry::kHealthExposuresDiffer, "exposure",
+            "cameras: left and right are exposed differently, by more than camera.exposure_limit_percent",
+            "cameras: left and right are exposed alike again");
+  health_ = health;
   if (const std::uint64_t by = changed(allocations_, vitals.allocations()); by > 0) {
     log(LogLevel::kError, std::to_string(by) + " heap calls in real-time threads", {{"STEREOTRACK_CAUSE", "heap"}});
   }
@@ -135,6 +147,21 @@ void Service::log_changes(const Daemon& daemon) {
   if (const std::uint64_t by = changed(frames_refused_, vitals.frames_refused.get()); by > 0) {
     log(LogLevel::kError, std::to_string(by) + " pairs were refused by the pipeline in the last second",
         {{"STEREOTRACK_CAUSE", "pipeline"}});
+  }
+}
+
+void Service::tend(Daemon& daemon) {
+  daemon.tend(runtime::monotonic_now());
+  using Weight = capture::SourceNote::Weight;
+  for (const capture::SourceNote& note : daemon.tend_source()) {
+    const LogLevel level = note.weight == Weight::kError     ? LogLevel::kError
+                           : note.weight == Weight::kWarning ? LogLevel::kWarning
+                                                             : LogLevel::kNotice;
+    if (*note.camera == '\0') {
+      log(level, note.text, {{"STEREOTRACK_CAUSE", note.cause}});
+    } else {
+      log(level, note.text, {{"STEREOTRACK_CAUSE", note.cause}, {"STEREOTRACK_CAMERA", note.camera}});
+    }
   }
 }
 
@@ -170,7 +197,7 @@ void Service::run(Daemon& daemon) {
   Clock::time_point next = Clock::now();
   while (take_signals() && !daemon.is_over()) {
     feed_watchdog(daemon);
-    daemon.tend(runtime::monotonic_now());
+    tend(daemon);
     if (Clock::now() >= next) {
       every_second(daemon);
       next = std::max(next + std::chrono::seconds(1), Clock::now());

@@ -46,6 +46,7 @@ class Service {
   [[nodiscard]] bool take_signals();
   void every_second(const Daemon& daemon);
   void log_changes(const Daemon& daemon);
+  void tend(Daemon& daemon);
   void feed_watchdog(const Daemon& daemon);
 
   Config config_;
@@ -57,6 +58,7 @@ class Service {
   std::array<std::uint64_t, 3> beats_{};
   std::array<std::uint64_t, kScheduleCounters.size()> schedule_{};
   std::uint64_t efforts_ = 0;
+  std::uint64_t health_ = 0;
   std::uint64_t allocations_ = 0;
   std::uint64_t telemetry_failed_ = 0;
   std::uint64_t frames_refused_ = 0;

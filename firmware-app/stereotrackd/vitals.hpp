@@ -75,6 +75,9 @@ struct Vitals {
   Counter health;                        ///< now: sum of telemetry::Health
   Counter reloads;                       ///< plans taken over
   Counter targets;                       ///< of the last message
+  Counter skew_over;                     ///< pairs whose skew was over camera.skew_limit_ms
+  Counter skew_max_us;                   ///< largest skew of a pair
+  Counter exposures_differ;              ///< pairs whose exposures were over camera.exposure_limit_percent apart
   runtime::Histogram publisher_wake_up;  ///< how late it woke for a slot's decision
   runtime::Histogram send_error;         ///< |sent - due|
   runtime::Histogram capture_to_send;

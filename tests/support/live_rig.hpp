@@ -42,12 +42,18 @@ class Ear {
     for (std::ptrdiff_t size = listener_.receive(buffer); size >= 0; size = listener_.receive(buffer)) {
       const auto outcome = receiver_.accept(std::span(buffer).first(static_cast<std::size_t>(size)));
       if (outcome == telemetry::Outcome::kPair) pairs_.push_back(receiver_.pair());
+      if (outcome == telemetry::Outcome::kPair || outcome == telemetry::Outcome::kPart) {
+        auto& bytes = messages_[receiver_.datagram().header.sequence];
+        bytes.insert(bytes.end(), buffer.begin(), buffer.begin() + size);
+      }
       if (outcome == telemetry::Outcome::kStatus) statuses_.push_back(*receiver_.datagram().status);
     }
   }
 
   [[nodiscard]] const std::vector<telemetry::Pair>& pairs() const { return pairs_; }
   [[nodiscard]] const std::vector<telemetry::Status>& statuses() const { return statuses_; }
+  /// The bytes of each, by sequence: parts one after the other.
+  [[nodiscard]] const std::map<std::uint64_t, std::vector<std::byte>>& messages() const { return messages_; }
   [[nodiscard]] const telemetry::Receiver& receiver() const { return receiver_; }
 
  private:
@@ -55,6 +61,7 @@ class Ear {
   telemetry::Receiver receiver_;
   std::vector<telemetry::Pair> pairs_;
   std::vector<telemetry::Status> statuses_;
+  std::map<std::uint64_t, std::vector<std::byte>> messages_;
 };
 
 [[nodiscard]] inline signals::SignalRules rules_of(std::vector<signals::Signal> wanted) {
@@ -93,6 +100,7 @@ struct LiveRig {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       daemon->tend(runtime::monotonic_now());
       ear.listen();
+      for (capture::SourceNote& note : daemon->tend()) notes.push_back(std::move(note));
     }
     daemon->stop();
     ear.listen();
@@ -109,6 +117,7 @@ struct LiveRig {
   config::Configuration configuration;
   StereoCalibration calibration;
   Ear ear;
+  std::vector<capture::SourceNote> notes;  ///< what the service would have logged
   std::unique_ptr<daemon::Daemon> daemon;
 };
 

@@ -44,16 +44,19 @@ std::unique_ptr<std::uint8_t[]> Film::keep(Picture& picture, const Config& confi
   return memory;
 }
 
-Film::Film(FrameSource& source, const Config& config) : info_(source.info()), repeat_(config.repeat) {
-  // Before it is drawn, which takes long.
+void Film::check(const SourceInfo& info, const Config& config) {
   const std::uint64_t pair_bytes =
-      picture_bytes(info_.format, info_.width, info_.height) * static_cast<std::uint64_t>(info_.stereo ? 2 : 1);
-  if (info_.pairs && *info_.pairs * pair_bytes > config.most_bytes) {
-    throw std::runtime_error(info_.name + ": " + std::to_string(*info_.pairs) + " pairs take " +
-                             std::to_string((*info_.pairs * pair_bytes >> 20) + 1) +
-                             " MB of memory, and there may be " + std::to_string(config.most_bytes >> 20) +
+      picture_bytes(info.format, info.width, info.height) * static_cast<std::uint64_t>(info.stereo ? 2 : 1);
+  if (info.pairs && *info.pairs * pair_bytes > config.most_bytes) {
+    throw std::runtime_error(info.name + ": " + std::to_string(*info.pairs) + " pairs take " +
+                             std::to_string((*info.pairs * pair_bytes >> 20) + 1) + " MB of memory, and there may be " +
+                             std::to_string(config.most_bytes >> 20) +
                              ": raise source.memory_mb, or play fewer (synthetic.frames)");
   }
+}
+
+Film::Film(FrameSource& source, const Config& config) : info_(source.info()), repeat_(config.repeat) {
+  check(info_, config);  // before it is drawn, which takes long
   std::size_t read = 0;
   for (;;) {
     Pair kept;

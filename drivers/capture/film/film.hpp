@@ -26,6 +26,9 @@ class Film final : public LiveSource {
     std::uint64_t most_bytes = std::uint64_t{1} << 30;
   };
 
+  /// Whether a film of that would be taken, as far as can be said before it is read. Throws std::runtime_error.
+  static void check(const SourceInfo& info, const Config& config);
+
   /// Reads the source to its end. Throws std::runtime_error: no pair could be read, or more than most_bytes.
   Film(FrameSource& source, const Config& config);
 

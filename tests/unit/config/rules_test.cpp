@@ -57,6 +57,24 @@ TEST(Rules, TheLineStartsWhereTheUserSpokeNotAtADefault) {
             "give low_sd <= high_sd; foreground.low_sd is from the defaults");
 }
 
+TEST(Rules, CamerasNeedDevicesOfTheirOwn) {
+  const Layer cameras = override_layer("source.name=cameras");
+  EXPECT_NE(refused({cameras}).find("camera.left.device"), std::string::npos);
+  const Layer left = override_layer("camera.left.device=/dev/video0");
+  EXPECT_EQ(refused({cameras, left}), "");
+  EXPECT_NE(refused({cameras, left, override_layer("camera.right.device=/dev/video0")}).find("both cameras"),
+            std::string::npos);
+  EXPECT_EQ(refused({cameras, left, override_layer("camera.right.device=/dev/video2")}), "");
+  // Who watches no cameras may say what he likes of them.
+  EXPECT_EQ(refused({left, override_layer("camera.right.device=/dev/video0")}), "");
+}
+
+TEST(Rules, AnExposureFitsBetweenTwoFrames) {
+  EXPECT_EQ(refused({override_layer("camera.exposure_us=33000")}), "");
+  EXPECT_EQ(refused({override_layer("camera.exposure_us=33334")}).find("--set camera.exposure_us=33334: "), 0U);
+  EXPECT_EQ(refused({override_layer("camera.exposure_us=33334"), override_layer("camera.fps=25")}), "");
+}
+
 TEST(Rules, LevelSetWithoutIterationsIsRefused) {
   EXPECT_EQ(refused({override_layer("level_set.on=false"), override_layer("level_set.iterations=0")}), "");
   EXPECT_EQ(refused({override_layer("level_set.on=true"), override_layer("level_set.iterations=1")}), "");

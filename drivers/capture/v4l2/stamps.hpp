@@ -1,0 +1,109 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include "pipeline/core/time.hpp"
+
+namespace stereotrack::capture::v4l2 {
+
+/// A driver's count of frames, 32 bits wide, continued beyond its wrap-around.
+/// A count that stands still or goes back (a driver that starts anew) is the next frame, nothing lost: there is no
+/// telling. One thread.
+class SequenceCount {
+ public:
+  struct Frame {
+    std::uint64_t sequence = 0;
+    std::uint64_t lost = 0;  ///< frames between the last one and this
+  };
+  [[nodiscard]] Frame next(std::uint32_t counted) noexcept {
+    if (!started_) {
+      started_ = true;
+      last_ = counted;
+      return {last_, 0};
+    }
+    const std::uint32_t ahead = counted - raw();
+    const bool forward = ahead != 0 && ahead < 0x8000'0000U;
+    // The low half follows the driver's count; where that went back, by an offset.
+    if (!forward) offset_ += 1U - ahead;
+    const std::uint64_t lost = forward ? ahead - 1 : 0;
+    last_ += lost + 1;
+    return {last_, lost};
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t raw() const noexcept { return static_cast<std::uint32_t>(last_) - offset_; }
+
+  bool started_ = false;
+  std::uint32_t offset_ = 0;  ///< our low half - the driver's count
+  std::uint64_t last_ = 0;
+};
+
+/// A driver's stamps as times of one clock that never goes back: CLOCK_MONOTONIC, which is what they promise to be.
+///
+/// What a stamp is expected to be: later than the last, and at most an hour before it was taken. Where it is not,
+/// the count may have come round: of seconds in 32 bits, microseconds in 32 bits or nanoseconds in 64 (which the
+/// arithmetic undoes by itself). What no such count explains is a step: the time then goes on from when the frame was
+/// taken, and stamps are measured from there. A first stamp that is not near the monotonic clock is a step, too.
+/// One thread.
+class StampLine {
+ public:
+  struct Stamp {
+    std::chrono::nanoseconds time{0};  ///< on CLOCK_MONOTONIC
+    bool step = false;
+  };
+  /// `raw` as the driver has it, `taken` by CLOCK_MONOTONIC.
+  [[nodiscard]] Stamp next(std::chrono::nanoseconds raw, std::chrono::nanoseconds taken) noexcept {
+    const Stamp stamp = place(count(raw), count(taken));
+    last_raw_ = count(raw);
+    last_time_ = count(stamp.time);
+    started_ = true;
+    return stamp;
+  }
+
+ private:
+  // Nanoseconds modulo 2^64: differences are right across any wrap-around.
+  using Count = std::uint64_t;
+  static constexpr Count kSecond = 1'000'000'000;
+  static constexpr Count kHour = 3600 * kSecond;
+  static constexpr Count kHalf = ~Count{0} / 2;
+  static constexpr Count kSlack = kSecond / 1000;  // driver and we read the clock on two cores
+
+  static Count count(std::chrono::nanoseconds time) noexcept { return static_cast<Count>(time.count()); }
+  static std::chrono::nanoseconds time(Count count) noexcept {
+    return std::chrono::nanoseconds(static_cast<std::int64_t>(count));
+  }
+
+  [[nodiscard]] Stamp place(Count raw, Count taken) const noexcept {
+    if (!started_) {
+      const Count age = taken + kSlack - raw;
+      return age <= kHour + kSlack ? Stamp{time(raw), false} : Stamp{time(taken), true};
+    }
+    constexpr Count kRounds[] = {0, kSecond << 32, 1000ULL << 32};
+    for (const Count round : kRounds) {
+      const Count later = raw + round - last_raw_;
+      if (later == 0 || later > kHalf) continue;
+      const Count at = last_time_ + later;
+      if (taken + kSlack - at <= kHour + kSlack) return {time(at), false};
+    }
+    return {time(taken > last_time_ ? taken : last_time_ + 1), true};
+  }
+
+  bool started_ = false;
+  Count last_raw_ = 0;
+  Count last_time_ = 0;
+};
+
+/// Which moment of a frame its stamp names.
+enum class StampedAt : std::uint8_t { kStartOfExposure, kEndOfFrame };
+
+/// The middle of the exposure of a sensor that exposes all rows at once; of a rolling shutter, of its first row.
+///     start of exposure:  stamp + exposure / 2
+///     end of frame:       stamp - readout - exposure / 2
+[[nodiscard]] constexpr std::chrono::nanoseconds mid_exposure(std::chrono::nanoseconds stamp, StampedAt at,
+                                                              std::chrono::nanoseconds exposure,
+                                                              std::chrono::nanoseconds readout) noexcept {
+  return at == StampedAt::kStartOfExposure ? stamp + exposure / 2 : stamp - readout - exposure / 2;
+}
+
+}  // namespace stereotrack::capture::v4l2

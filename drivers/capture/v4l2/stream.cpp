@@ -1,0 +1,96 @@
+#include "drivers/capture/v4l2/stream.hpp"
+
+#include <linux/videodev2.h>
+
+#include <utility>
+
+namespace stereotrack::capture::v4l2 {
+namespace {
+
+StampKind stamp_kind(std::uint32_t flags, const Stream::Parts& parts, std::vector<std::string>& notes) {
+  StampKind kind;
+  kind.by_arrival = (flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  const bool at_start = (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+  kind.at = !kind.by_arrival && at_start ? StampedAt::kStartOfExposure : StampedAt::kEndOfFrame;
+  if (kind.by_arrival) {
+    notes.emplace_back(
+        "the driver does not promise stamps of the monotonic clock: frames are stamped as they are taken, late by the "
+        "time that this takes");
+  }
+  if (kind.at == StampedAt::kStartOfExposure) return kind;
+  kind.readout = parts.readout ? *parts.readout : parts.readout_guess;
+  if (!parts.readout) {
+    notes.push_back(
+        "its stamps are the ends of frames, and nobody tells how long a frame takes to read out: taken for " +
+        std::to_string(kind.readout.count() / 1000) +
+        " us, the shortest time between frames; measure it and set readout_us");
+  }
+  return kind;
+}
+
+}  // namespace
+
+Stream::Stream(Parts parts, std::vector<std::string>& notes)
+    : parts_(std::move(parts)),
+      buffers_(parts_.node, parts_.layout, parts_.buffers, parts_.memory, parts_.info.name),
+      stamp_kind_(stamp_kind(buffers_.flags(), parts_, notes)),
+      in_force_(parts_.controls.settings(), parts_.control_delay_frames) {
+  parts_.info.buffers = buffers_.size();
+  const Layout& layout = parts_.layout;
+  for (std::uint32_t i = 0; i < buffers_.size(); ++i) {
+    pictures_[i] = {buffers_.memory(i).data() + layout.offset(), layout.width, layout.height,
+                    static_cast<std::ptrdiff_t>(layout.stride), layout.format->format};
+  }
+  // Room for the capture thread to write in.
+  failure_.reserve(parts_.info.name.size() + parts_.info.model.size() + 400);
+  watch_events();
+}
+
+Stream::~Stream() {
+  if (!streaming_) return;
+  int type = static_cast<int>(parts_.layout.buffer_type());
+  (void)parts_.node.ask(VIDIOC_STREAMOFF, type);
+}
+
+void Stream::watch_events() {
+  const auto subscribe = [](const Device& device, std::uint32_t type, std::uint32_t id) {
+    v4l2_event_subscription wish{};
+    wish.type = type;
+    wish.id = id;
+    return device.ask(VIDIOC_SUBSCRIBE_EVENT, wish) == 0;
+  };
+  watches_node_ = subscribe(parts_.node, V4L2_EVENT_SOURCE_CHANGE, 0);
+  const Device& controls = parts_.controls_on_sensor ? parts_.sensor : parts_.node;
+  bool& watched = parts_.controls_on_sensor ? watches_sensor_ : watches_node_;
+  for (const std::uint32_t id : parts_.controls.watched()) {
+    if (subscribe(controls, V4L2_EVENT_CTRL, id)) watched = true;
+  }
+}
+
+void Stream::start() {
+  const auto fail = [&](const char* what, int error) {
+    std::string way_out = "plug it in again, or load its driver anew";
+    if (error == EPIPE) way_out = "set the formats of all its parts alike (media-ctl -p shows them)";
+    if (error == ENOSPC) way_out = "choose a smaller size or rate, or give it a bus of its own";
+    if (error == EBUSY) way_out = "stop the other program that uses it";
+    refuse(parts_.info.name,
+           std::string(what) + " (" + error_text(error) + ", errno " + std::to_string(error) + "): " + way_out);
+  };
+  for (std::uint32_t i = 0; i < buffers_.size(); ++i) {
+    if (const int error = queue(i); error != 0) fail("does not take its buffers", error);
+  }
+  int type = static_cast<int>(parts_.layout.buffer_type());
+  if (const int error = parts_.node.ask(VIDIOC_STREAMON, type); error != 0) fail("does not start to stream", error);
+  streaming_ = true;
+}
+
+Camera::Counters Stream::counters() const noexcept {
+  Counters counters;
+  counters.frames = frames_.load(std::memory_order_relaxed);
+  counters.damaged = damaged_.load(std::memory_order_relaxed);
+  counters.lost = lost_frames_.load(std::memory_order_relaxed);
+  counters.steps = steps_.load(std::memory_order_relaxed);
+  return counters;
+}
+
+}  // namespace stereotrack::capture::v4l2

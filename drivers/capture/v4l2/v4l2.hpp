@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/capture/camera.hpp"
+
+/// Cameras over the kernel's own interface, Video4Linux 2: no library between.
+namespace stereotrack::capture::v4l2 {
+
+/// How buffers reach the program.
+enum class Memory : std::uint8_t {
+  kMapped,    ///< the device's memory, mapped; cached where driver and kernel can do that
+  kExported,  ///< the same memory as dma-bufs, with DMA_BUF_IOCTL_SYNC around each lease
+};
+
+/// What is wanted of one sensor. What is not said stays as the driver has it.
+struct Settings {
+  std::string device;           ///< /dev/video0, a link to it (/dev/v4l/by-path/...), bus:platform:vivid-000, name:CARD
+  int width = 0;                ///< [px]; 0 with height 0: as the driver has it
+  int height = 0;               ///< [px]
+  std::string format = "auto";  ///< a name of format_names(); auto: grey, where there is none the cheapest to read
+  double fps = 0;               ///< 0: as the driver has it
+  int buffers = 8;              ///< wanted; the driver may need more. FramePool's slots and two, at least
+  std::optional<double> exposure_us;  ///< automatic exposure is switched off with it
+  std::optional<double> gain;         ///< 1 = none; automatic gain is switched off with it
+  std::optional<int> black_level;     ///< in the driver's own unit
+  std::optional<double> readout_us;   ///< from the end of the exposure to the end of the frame, where the driver stamps
+                                      ///< the latter. Not said: see stamp_notes below
+  int control_delay_frames = 2;       ///< from a change of a control to the first frame that was exposed with it
+  Memory memory = Memory::kMapped;
+};
+
+/// Opens and sets up one sensor; start() makes it stream.
+/// Throws std::runtime_error with one line that names the device and the way out: none or several of that name (and
+/// which there are), no permission, busy, not a camera, a size, format or number of buffers that cannot be had.
+/// `notes`: what the driver made of the wish where that is no reason to stop, one line each, with the device's name:
+///   * controls that it lacks, refused or clamped, and another frame rate;
+///   * stamps. CLOCK_MONOTONIC at the start of an exposure or the end of a frame is what the driver should promise.
+///     Where it promises no clock, frames are stamped as they are taken. Where the stamp is the end of the frame and
+///     neither the driver nor `readout_us` tells how long reading out takes, the shortest period that the driver offers
+///     for the size is taken for it: sensors are as fast as they can be read. All told here.
+[[nodiscard]] std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>* notes = nullptr);
+
+/// What one device is and offers, for people.
+struct CameraFacts {
+  struct Size {
+    int width = 0, height = 0;          ///< [px]
+    int max_width = 0, max_height = 0;  ///< the same, where it is no range
+    std::vector<double> rates;          ///< frames a second; of a range the highest and the lowest
+  };
+  struct Format {
+    std::string fourcc;
+    std::string_view name;  ///< Settings::format; empty: cannot be used
+    std::vector<Size> sizes;
+  };
+  struct Control {
+    std::string name;
+    std::int64_t minimum = 0, maximum = 0, step = 0, standard = 0;
+    std::optional<std::int64_t> value;
+  };
+  std::string path;  ///< /dev/video0
+  std::string card;
+  std::string bus;
+  std::string driver;
+  std::vector<std::string> links;  ///< other names: /dev/v4l/by-path/...
+  std::vector<Format> formats;
+  std::vector<Control> controls;
+  std::string problem;  ///< why it could not be asked, with the way out; empty: it could
+};
+/// All that can capture, by number, and those that could not be asked.
+[[nodiscard]] std::vector<CameraFacts> list_cameras();
+
+/// Names of formats as Settings::format and `auto` know them, in the order in which `auto` takes them.
+[[nodiscard]] std::vector<std::string_view> format_names();
+
+}  // namespace stereotrack::capture::v4l2

@@ -1,0 +1,108 @@
+#include "firmware-app/rig/cameras.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+#include "config/error.hpp"
+
+namespace stereotrack {
+
+namespace {
+
+using trigger::Side;
+
+std::string source_name(const config::CameraConfig& camera) {
+  return camera.left.device + (camera.right.device.empty() ? "" : ", " + camera.right.device);
+}
+
+std::chrono::nanoseconds from_ms(double ms) {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(ms * 1e6 + 0.5));
+}
+
+void check_format(const config::Loaded& loaded) {
+  const std::vector<std::string_view> names = capture::v4l2::format_names();
+  const std::string& wanted = loaded.configuration.camera.format;
+  if (std::find(names.begin(), names.end(), wanted) != names.end()) return;
+  std::string all;
+  for (const std::string_view name : names) all += (all.empty() ? "" : ", ") + std::string(name);
+  throw config::error_at(loaded.origins, "camera.format", "\"" + wanted + "\" is no format: want one of " + all);
+}
+
+std::string line_of(Side side, const capture::CameraInfo& info) {
+  char rate[32];
+  (void)std::snprintf(rate, sizeof rate, "%.1f", 1.0 / std::chrono::duration<double>(info.period).count());
+  return std::string(side == Side::kLeft ? "left" : "right") + " camera: " + info.name + ", " + info.model + ": " +
+         capture::delivery_text(info) + " at " + rate + " frames/s";
+}
+
+}  // namespace
+
+capture::v4l2::Settings camera_settings(const config::CameraConfig& camera, Side side) {
+  capture::v4l2::Settings settings;
+  settings.device = side == Side::kLeft ? camera.left.device : camera.right.device;
+  settings.width = camera.width;
+  settings.height = camera.height;
+  settings.format = camera.format;
+  settings.fps = camera.fps;
+  settings.buffers = camera.buffers;
+  if (camera.exposure_us > 0) settings.exposure_us = camera.exposure_us;
+  if (camera.gain > 0) settings.gain = camera.gain;
+  if (camera.black_level >= 0) settings.black_level = camera.black_level;
+  if (camera.readout_us > 0) settings.readout_us = camera.readout_us;
+  return settings;
+}
+
+capture::StereoCameras::Config pairing_config(const config::CameraConfig& camera) {
+  capture::StereoCameras::Config pairing;
+  pairing.name = source_name(camera);
+  pairing.stereo = !camera.right.device.empty();
+  pairing.tolerance = camera.tolerance;
+  pairing.triggered = camera.triggered;
+  pairing.timeout = from_ms(camera.timeout_ms);
+  return pairing;
+}
+
+capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
+                                           std::function<void(const std::string&)> say) {
+  return [camera, say = std::move(say)](Side side) {
+    std::vector<std::string> notes;
+    std::unique_ptr<capture::Camera> opened = capture::v4l2::open(camera_settings(camera, side), &notes);
+    for (const std::string& note : notes) say(note);
+    return opened;
+  };
+}
+
+std::unique_ptr<capture::StereoCameras> open_cameras(const config::Loaded& loaded,
+                                                     std::function<void(const std::string&)> say) {
+  check_format(loaded);
+  const config::CameraConfig& camera = loaded.configuration.camera;
+  return std::make_unique<capture::StereoCameras>(camera_opener(camera, std::move(say)), pairing_config(camera));
+}
+
+CameraCheck check_cameras(const config::Loaded& loaded) {
+  check_format(loaded);
+  const config::CameraConfig& camera = loaded.configuration.camera;
+  CameraCheck check;
+  const auto open = camera_opener(camera, [&check](const std::string& note) { check.notes.push_back(note); });
+  std::optional<capture::CameraInfo> first;
+  std::vector<std::unique_ptr<capture::Camera>> opened;  // together, as in a run: they may share a bus
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    if (side == Side::kRight && camera.right.device.empty()) continue;
+    try {
+      opened.push_back(open(side));
+      const capture::CameraInfo& info = opened.back()->info();
+      check.lines.push_back(line_of(side, info));
+      if (!first) first = info;
+      const std::string differs = capture::difference_of(info, *first);
+      if (!differs.empty()) check.failures.push_back(differs);
+    } catch (const std::runtime_error& error) {
+      check.failures.emplace_back(error.what());
+    }
+  }
+  if (first) check.info = capture::source_info(pairing_config(camera), *first);
+  return check;
+}
+
+}  // namespace stereotrack
