@@ -220,8 +220,11 @@ LineBits OutputLines::reopen(std::string* why) {
   LineBits back = 0;
   for (const auto& chip : state_->chips) {
     LineRequest* const retired = chip->retired.exchange(nullptr);
-    // Held: the handler of a fault may be at it, and the process ends.
-    if (!state_->held.load()) delete retired;
+    if (state_->held.load()) {
+      chip->retired.store(retired);  // the handler of a fault may be at it
+      continue;
+    }
+    delete retired;
     if ((gone() & chip->mine) == 0 || chip->incoming.load() != nullptr) continue;
     try {
       // It may have come back under another path.

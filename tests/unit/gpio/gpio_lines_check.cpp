@@ -70,8 +70,10 @@ class Check {
 
   [[nodiscard]] OutputLines output() const { return open_lines(std::vector{LineSpec{out_}}, "gpio_lines_check"); }
   [[nodiscard]] InputLines input(Edges edges, bool active_low = false) const {
+    // Behind a line of another chip, so that numbers in the program are not those on the chip.
+    const InputSpec before{.name = {std::string(simulated_chip::kChip), "before"}};
     const InputSpec spec{.name = in_, .active_low = active_low, .edges = edges};
-    return open_inputs(std::vector{spec}, "gpio_lines_check");
+    return open_inputs(std::vector{before, spec}, "gpio_lines_check");
   }
 
   /// Attribute of a line of gpio-sim.
@@ -125,7 +127,8 @@ class Check {
       const MonotonicTime before = now();
       drive(lines, i % 2 == 0);
       const std::vector<EdgeEvent> came = take(edges, 1);
-      all = all && came.size() == 1 && came[0].edge == (i % 2 == 0 ? Edge::kRising : Edge::kFalling);
+      all =
+          all && came.size() == 1 && came[0].line == 1 && came[0].edge == (i % 2 == 0 ? Edge::kRising : Edge::kFalling);
       if (came.empty()) continue;
       in_time = in_time && came[0].time >= before && came[0].time <= now();
       const auto wanted = static_cast<std::uint32_t>(gpiod::interface() == "1" && !is_simulated() ? 0 : i + 1);
@@ -134,7 +137,7 @@ class Check {
     expect(all, "20 edges come once each, in order");
     expect(in_time, "their stamps are of CLOCK_MONOTONIC, between driving and reading");
     expect(numbered, "their sequence numbers are what this interface has");
-    expect(take(edges, 1).empty() && edges.reading(0).lost == 0, "no more than these, none lost");
+    expect(take(edges, 1).empty() && edges.reading(1).lost == 0, "no more than these, none lost");
   }
 
   void what_overflows_is_counted() {
@@ -145,7 +148,7 @@ class Check {
     const std::size_t kept = take(edges, 1000).size();
     drive(lines, false);
     const std::size_t after = take(edges, 1).size();
-    const std::uint64_t lost = edges.reading(0).lost;
+    const std::uint64_t lost = edges.reading(1).lost;
     std::printf("       of 201 edges unread %zu were kept, %llu are known to be lost\n", kept,
                 static_cast<unsigned long long>(lost));
     expect(after == 1, "and the next one comes");
@@ -190,15 +193,16 @@ class Check {
     InputLines edges = input(Edges::kBoth);
     plug(false);
     (void)take(edges, 1);
-    const bool woken = edges.gone() == 1;
+    const bool woken = edges.gone() != 0;
     edges.probe();
-    expect(edges.gone() == 1, std::string("an input that went is noticed, ") + (woken ? "by waking" : "by probing"));
+    expect((edges.gone() & 2U) != 0,
+           std::string("an input that went is noticed, ") + (woken ? "by waking" : "by probing"));
     expect(lines.refresh(now()).failed == 1 && lines.gone() == 1, "an output that went is noticed");
     std::string why;
     const bool away = edges.reopen() == 0 && lines.reopen(&why) == 0;
     expect(away, "neither comes back meanwhile: " + why);
     plug(true);
-    expect(edges.reopen() == 1 && edges.gone() == 0, "the input is back");
+    expect((edges.reopen() & 2U) != 0 && edges.gone() == 0, "the input is back");
     expect(lines.reopen(&why) == 1, "the output is back");
     drive(lines, true);
     expect(take(edges, 1).size() == 1, "and what the one drives the other reads");
