@@ -100,7 +100,7 @@ struct LiveRig {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       daemon->tend(runtime::monotonic_now());
       ear.listen();
-      for (capture::SourceNote& note : daemon->tend()) notes.push_back(std::move(note));
+      for (capture::SourceNote& note : daemon->tend_source()) notes.push_back(std::move(note));
     }
     daemon->stop();
     ear.listen();
