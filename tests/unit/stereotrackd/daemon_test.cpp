@@ -223,6 +223,9 @@ bool is_well(const LiveRig& rig) {
   return !rig.ear.statuses().empty() && (rig.ear.statuses().back().health & telemetry::kHealthLineFailed) == 0;
 }
 
+/// Half a minute: what has not come by then never does.
+bool is_long(const LiveRig& rig) { return rig.ear.statuses().size() > 30; }
+
 TEST(Daemon, AnOutputChipThatWentIsDrivenAgainWithoutARestart) {
   LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce), kLatency, {},
               {{.name = {"sim", "usb_heart"}}, {.name = {"sim", "usb_still"}}},
@@ -242,7 +245,7 @@ TEST(Daemon, AnOutputChipThatWentIsDrivenAgainWithoutARestart) {
     } else if (step == 2 && beats() > before + 4 && is_well(rig)) {
       ++step;
     }
-    return step == 3;
+    return step == 3 || is_long(rig);
   });
   EXPECT_EQ(step, 3);
   EXPECT_EQ(rig.daemon->lines().gone(), 0U);
@@ -257,7 +260,7 @@ TEST(Daemon, AnOutputChipThatWentIsNoticedThoughNothingChanges) {
   bool went = false;
   rig.run([&] {
     if (!went && !rig.ear.pairs().empty()) gpio::simulated_chip::set_gone("usb_quiet", went = true);
-    return went && rig.daemon->lines().gone() != 0;
+    return is_long(rig) || (went && rig.daemon->lines().gone() != 0);
   });
   gpio::simulated_chip::set_gone("usb_quiet", false);
   EXPECT_EQ(gpio::simulated_chip::edges("usb_quiet"), 0U);
@@ -291,7 +294,7 @@ TEST(Daemon, AnEdgeOfAnInputIsAReasonToRecordUnlessItComesTooSoon) {
       drive(false, 106);
       ++step;
     }
-    return box.recordings.load() == 2 && rig.ear.statuses().size() > 1;
+    return is_long(rig) || (box.recordings.load() == 2 && rig.ear.statuses().size() > 1);
   });
   EXPECT_EQ(rig.daemon->inputs().events(0), 4U);
   EXPECT_EQ(rig.daemon->inputs().lost(0), 0U);
@@ -328,9 +331,10 @@ TEST(Daemon, AnInputChipThatWentIsToldInTheHealthAndReadAgain) {
       gpio::simulated_chip::drive("usb_button", true, MonotonicTime(std::chrono::seconds(100)));
       ++step;
     }
-    return step == 3 && rig.daemon->inputs().events(0) == 1;
+    return is_long(rig) || (step == 3 && rig.daemon->inputs().events(0) == 1);
   });
   EXPECT_EQ(step, 3);
+  EXPECT_EQ(rig.daemon->inputs().events(0), 1U);
   EXPECT_EQ(rig.daemon->inputs().outages(), 1U);
 }
 
