@@ -14,7 +14,8 @@
   board.py targets [GROUP|GROUP/CASE]...               the CMake targets that the cases want
 
 A case is cases/GROUP/CASE.sh. It prints TAP (guest/tap.sh) and says in its head, in comments: "# wants: bin/PROGRAM ..."
-what it wants of the build folder, "# limit: SECONDS" of the board's clock (120).
+what it wants of the build folder, "# brings: PATH ..." what of the project's files the programs read (they find them where
+they were when they were built), "# limit: SECONDS" of the board's clock (120).
 
 Everything lies in build/board, or where STEREOTRACK_BOARD_CACHE says. The board is booted once and its state is saved;
 each run starts from there, in seconds, on disks that forget. No board outlives board.py.
@@ -300,7 +301,8 @@ class Case:
         self.path = path
         self.name = f"{path.parent.name}/{path.stem}"
         head = path.read_text()
-        self.wants = [name for line in re.findall(r"^# wants: (.*)$", head, re.M) for name in line.split()]
+        self.wants, self.brings = ([name for line in re.findall(rf"^# {word}: (.*)$", head, re.M) for name in line.split()]
+                                   for word in ("wants", "brings"))
         self.limit = int((re.findall(r"^# limit: (\d+)$", head, re.M) or [120])[0])
         self.facts = []  # (name, "ok" | "not ok" | "skip", text)
         self.comments = []
@@ -365,9 +367,12 @@ def command_test(args):
         print(f"{case.name}", flush=True)
         things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh"}
         things.update({pathlib.Path(want).name: build / want for want in case.wants})
+        things.update({f".board/project/{path}": PROJECT / path for path in case.brings})
+        start = (f"mkdir -p {shlex.quote(str(PROJECT.parent))}\n"
+                 f"ln -s /payload/.board/project {shlex.quote(str(PROJECT))}\n"
+                 f"limited {case.limit} {case.name} bash case.sh")
         try:
-            case.finish(run(args.clock, things, f"limited {case.limit} {case.name} bash case.sh", case.limit,
-                            results / case.name, case.hear))
+            case.finish(run(args.clock, things, start, case.limit, results / case.name, case.hear))
         except BoardError as error:
             case.comments += str(error).splitlines()
             print(f"  {error}")
