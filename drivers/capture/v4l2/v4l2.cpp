@@ -41,7 +41,7 @@ CameraFacts facts_of(const Node& node) {
   Device device;
   if (!node.problem.empty() || device.open(node.path) != 0) return facts;
   facts.links = links_to(node.path);
-  for (const std::uint32_t fourcc : list_formats(device, has_planes(node))) {
+  for (const auto& [fourcc, range_choice] : list_formats(device, has_planes(node))) {
     CameraFacts::Format& format = facts.formats.emplace_back();
     format.fourcc = fourcc_text(fourcc);
     if (const KnownFormat* const known = find_format(fourcc)) format.name = known->name;
