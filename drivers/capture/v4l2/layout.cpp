@@ -28,7 +28,7 @@ struct Format {
   [[nodiscard]] std::size_t size(std::size_t plane) const {
     return planes() ? raw.fmt.pix_mp.plane_fmt[plane].sizeimage : raw.fmt.pix.sizeimage;
   }
-  void want(std::uint32_t fourcc, int width, int height, bool full_range) {
+  void want(std::uint32_t fourcc, int width, int height) {
     const auto type = raw.type;
     raw = {};
     raw.type = type;
@@ -37,20 +37,22 @@ struct Format {
       raw.fmt.pix_mp.width = static_cast<std::uint32_t>(width);
       raw.fmt.pix_mp.height = static_cast<std::uint32_t>(height);
       raw.fmt.pix_mp.field = V4L2_FIELD_NONE;
-      if (full_range) {
-        raw.fmt.pix_mp.flags = V4L2_PIX_FMT_FLAG_SET_CSC;
-        raw.fmt.pix_mp.quantization = V4L2_QUANTIZATION_FULL_RANGE;
-      }
     } else {
       raw.fmt.pix.pixelformat = fourcc;
       raw.fmt.pix.width = static_cast<std::uint32_t>(width);
       raw.fmt.pix.height = static_cast<std::uint32_t>(height);
       raw.fmt.pix.field = V4L2_FIELD_NONE;
-      if (full_range) {
-        raw.fmt.pix.priv = V4L2_PIX_FMT_PRIV_MAGIC;
-        raw.fmt.pix.flags = V4L2_PIX_FMT_FLAG_SET_CSC;
-        raw.fmt.pix.quantization = V4L2_QUANTIZATION_FULL_RANGE;
-      }
+    }
+  }
+  /// Of what the driver has answered: its colour space is needed to say more of it.
+  void want_full_range() {
+    if (planes()) {
+      raw.fmt.pix_mp.flags |= V4L2_PIX_FMT_FLAG_SET_CSC;
+      raw.fmt.pix_mp.quantization = V4L2_QUANTIZATION_FULL_RANGE;
+    } else {
+      raw.fmt.pix.priv = V4L2_PIX_FMT_PRIV_MAGIC;
+      raw.fmt.pix.flags |= V4L2_PIX_FMT_FLAG_SET_CSC;
+      raw.fmt.pix.quantization = V4L2_QUANTIZATION_FULL_RANGE;
     }
   }
 };
@@ -215,8 +217,12 @@ Layout set_layout(const Device& device, bool planes_interface, const Settings& w
   std::string first_reason;
   for (const auto& [known, range_choice] : candidates) {
     Format made(planes_interface);
-    made.want(known->fourcc, width, height, range_choice);
-    const int error = device.ask(VIDIOC_S_FMT, made.raw);
+    made.want(known->fourcc, width, height);
+    int error = device.ask(VIDIOC_S_FMT, made.raw);
+    if (error == 0 && range_choice) {
+      made.want_full_range();
+      error = device.ask(VIDIOC_S_FMT, made.raw);
+    }
     if (error == EBUSY) {
       refuse(name, "busy: another program streams from it (fuser -v /dev/video* tells which): stop that");
     }

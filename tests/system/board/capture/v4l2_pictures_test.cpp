@@ -90,7 +90,11 @@ class Pictures : public VividTest {
       if (has_colour(kept.format)) {
         for (std::uint8_t& value : wanted) value = std::clamp<std::uint8_t>(value, 1, 254);
       }
-      EXPECT_TRUE(luma(kept) == wanted) << name;
+      const std::vector<std::uint8_t> made = luma(kept);
+      const auto differs = std::mismatch(made.begin(), made.end(), wanted.begin(), wanted.end());
+      EXPECT_TRUE(differs.first == made.end())
+          << name << ": pixel " << differs.first - made.begin() << " is " << static_cast<int>(*differs.first)
+          << " and not " << static_cast<int>(*differs.second);
     }
   }
   static void check_composed() {
