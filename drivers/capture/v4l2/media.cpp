@@ -7,6 +7,7 @@
 #include <sys/sysmacros.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -169,31 +170,84 @@ std::vector<std::uint32_t> formats_of_code(const Device& node, bool planes, std:
   }
 }
 
-void enable_way(const Found& found, const std::vector<std::size_t>& way, const std::string& name) {
-  const auto set = [&](const MediaGraph::Link& link, bool enabled) {
-    const MediaGraph::Pad* const source = find_by_id(found.graph.pads, link.source);
-    const MediaGraph::Pad* const sink = find_by_id(found.graph.pads, link.sink);
-    if (source == nullptr || sink == nullptr) return EINVAL;
-    media_link_desc wish{};
-    wish.source.entity = source->entity;
-    wish.source.index = static_cast<std::uint16_t>(source->index);
-    wish.source.flags = MEDIA_PAD_FL_SOURCE;
-    wish.sink.entity = sink->entity;
-    wish.sink.index = static_cast<std::uint16_t>(sink->index);
-    wish.sink.flags = MEDIA_PAD_FL_SINK;
-    wish.flags = enabled ? MEDIA_LNK_FL_ENABLED : 0;
-    return found.media.ask(MEDIA_IOC_SETUP_LINK, wish);
-  };
+int set_link(const Found& found, const MediaGraph::Link& link, bool enabled) {
+  const MediaGraph::Pad* const source = find_by_id(found.graph.pads, link.source);
+  const MediaGraph::Pad* const sink = find_by_id(found.graph.pads, link.sink);
+  if (source == nullptr || sink == nullptr) return EINVAL;
+  media_link_desc wish{};
+  wish.source.entity = source->entity;
+  wish.source.index = static_cast<std::uint16_t>(source->index);
+  wish.source.flags = MEDIA_PAD_FL_SOURCE;
+  wish.sink.entity = sink->entity;
+  wish.sink.index = static_cast<std::uint16_t>(sink->index);
+  wish.sink.flags = MEDIA_PAD_FL_SINK;
+  wish.flags = enabled ? MEDIA_LNK_FL_ENABLED : 0;
+  return found.media.ask(MEDIA_IOC_SETUP_LINK, wish);
+}
+
+void enable_way(Found& found, const std::vector<std::size_t>& way, const std::string& name) {
   for (const std::size_t index : way) {
-    const MediaGraph::Link& link = found.graph.links[index];
+    MediaGraph::Link& link = found.graph.links[index];
     if (link.enabled) continue;
     // A pad takes one picture at a time.
-    for (const MediaGraph::Link& other : found.graph.links) {
-      if (other.sink == link.sink && other.enabled && !other.immutable) (void)set(other, false);
+    for (MediaGraph::Link& other : found.graph.links) {
+      if (other.sink != link.sink || !other.enabled || other.immutable) continue;
+      if (set_link(found, other, false) == 0) other.enabled = false;
     }
-    if (const int error = set(link, true); error != 0) {
+    if (const int error = set_link(found, link, true); error != 0) {
       refuse(name, std::string("its parts cannot be connected (") + error_text(error) +
                        "): stop the program that uses them, media-ctl -p shows them");
+    }
+    link.enabled = true;
+  }
+}
+
+/// Puts a video node of a side way into what reaches it there.
+void set_side_node(const Device& node, const std::string& path, const v4l2_mbus_framefmt& format) {
+  const bool planes = has_planes(describe(node, path));
+  const std::vector<std::uint32_t> fourccs = formats_of_code(node, planes, format.code);
+  v4l2_format wish{};
+  wish.type = planes ? V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE : V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  if (fourccs.empty() || node.ask(VIDIOC_G_FMT, wish) != 0) return;
+  if (planes) {
+    wish.fmt.pix_mp.pixelformat = fourccs.front();
+    wish.fmt.pix_mp.width = format.width;
+    wish.fmt.pix_mp.height = format.height;
+  } else {
+    wish.fmt.pix.pixelformat = fourccs.front();
+    wish.fmt.pix.width = format.width;
+    wish.fmt.pix.height = format.height;
+    wish.fmt.pix.bytesperline = 0;
+  }
+  (void)node.ask(VIDIOC_S_FMT, wish);
+}
+
+/// What else hangs on the entity: the kernel does not start a stream while any link that is enabled, on the way or
+/// beside it, has two formats. Links that can be are disabled; what hangs on the others gets the format that comes.
+/// What refuses is told by STREAMON.
+void settle_sides(Found& found, const std::vector<std::size_t>& way, std::uint32_t entity, std::size_t depth) {
+  constexpr std::size_t kDeepest = 16;
+  if (depth == kDeepest) return;
+  Device device;
+  if (device.open(node_of(found.graph, entity)) != 0) return;
+  for (std::size_t i = 0; i < found.graph.links.size(); ++i) {
+    MediaGraph::Link& link = found.graph.links[i];
+    const MediaGraph::Pad* const source = find_by_id(found.graph.pads, link.source);
+    const MediaGraph::Pad* const sink = find_by_id(found.graph.pads, link.sink);
+    if (source == nullptr || sink == nullptr || source->entity != entity || !link.enabled) continue;
+    if (std::find(way.begin(), way.end(), i) != way.end()) continue;
+    if (!link.immutable && set_link(found, link, false) == 0) {
+      link.enabled = false;
+      continue;
+    }
+    const auto format = get_pad(device, source->index);
+    const std::string path = node_of(found.graph, sink->entity);
+    Device side;
+    if (!format || side.open(path) != 0) continue;
+    if (set_pad(side, sink->index, *format)) {
+      settle_sides(found, way, sink->entity, depth + 1);
+    } else {
+      set_side_node(side, path, *format);
     }
   }
 }
@@ -237,7 +291,7 @@ std::vector<std::size_t> way_from_sensor(const MediaGraph& graph, std::uint32_t 
 std::optional<SensorPart> connect_sensor(const Device& node, const Node& facts, Settings& wanted,
                                          const std::string& name) {
   if ((facts.capabilities & V4L2_CAP_IO_MC) == 0) return std::nullopt;
-  const std::optional<Found> found = find_media(facts.path);
+  std::optional<Found> found = find_media(facts.path);
   if (!found) refuse(name, "its media device cannot be read: add the program's user to the group video");
   const MediaGraph& graph = found->graph;
   const std::vector<std::size_t> links = way_from_sensor(graph, found->entity, wanted.sensor);
@@ -314,6 +368,9 @@ std::optional<SensorPart> connect_sensor(const Device& node, const Node& facts, 
   if ((wanted.width > 0 && wanted.width != width) || (wanted.height > 0 && wanted.height != height)) {
     refuse(name, std::to_string(wanted.width) + "x" + std::to_string(wanted.height) + " cannot be had, its sensor " +
                      part.name + " makes it " + std::to_string(width) + "x" + std::to_string(height));
+  }
+  for (const std::size_t index : links) {
+    settle_sides(*found, links, find_by_id(graph.pads, graph.links[index].source)->entity, 0);
   }
   wanted.width = width;
   wanted.height = height;

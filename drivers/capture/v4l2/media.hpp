@@ -58,8 +58,9 @@ struct SensorPart {
   int height = 0;
 };
 /// Where the node belongs to such a camera: enables the links from its sensor, sets the same format and size on all
-/// pads of the way, and narrows `wanted` down to what the node then has to be set to. Empty: it belongs to none.
-/// Throws std::runtime_error, one line: no sensor leads there, or none of the formats passes.
+/// pads of the way, disables or fits what hangs on its parts besides, and narrows `wanted` down to what the node then
+/// has to be set to. Empty: it belongs to none. Throws std::runtime_error, one line: no sensor leads there, or none of
+/// the formats passes.
 [[nodiscard]] std::optional<SensorPart> connect_sensor(const Device& node, const Node& facts, Settings& wanted,
                                                        const std::string& name);
 

@@ -68,7 +68,7 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
   if (const int error = parts.node.open(path); error != 0) refuse(settings.device, open_refusal(path, error));
   const Node node = describe(parts.node, path);
   if (!node.problem.empty() || !can_capture(node)) {
-    refuse(name, "is no camera: nothing can be captured from it; stereotrack doctor lists what can");
+    refuse(name, "is no camera: nothing can be captured from it; " + cameras_text(list_nodes()));
   }
 
   std::vector<std::string> told;

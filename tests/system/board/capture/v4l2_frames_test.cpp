@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numeric>
 
 #include "pipeline/core/checksum.hpp"
@@ -221,6 +222,22 @@ TEST_F(Frames, OfTwoCamerasComeFromEach) {
   }
   EXPECT_EQ(left->counters().frames, 10U);
   EXPECT_EQ(right->counters().frames, 10U);
+}
+
+// Of v4l2loopback, which hands on what another program writes.
+TEST_F(Frames, OfADriverThatPromisesNoClockAreStampedAsTheyAreTaken) {
+  ASSERT_EQ(std::system("v4l2-ctl -d2 -x width=320,height=240,pixelformat=GREY --stream-out-mmap --stream-count=400 "
+                        ">/dev/null 2>&1 & sleep 1"),
+            0);
+  std::vector<std::string> notes;
+  Settings wanted = settings("/dev/video2");
+  wanted.width = wanted.height = 0;
+  const auto camera = started(wanted, &notes);
+  EXPECT_EQ(camera->info().width, 320);
+  const Seen seen = watch(*camera, 10);
+  for (const std::string& note : notes) std::printf("%s\n", note.c_str());
+  std::printf("age %g ms, period %g ms\n", seen.mean_age_ms(), seen.mean_period_ms());
+  (void)std::system("pkill v4l2-ctl");
 }
 
 TEST_F(Frames, TakeNoHeap) {

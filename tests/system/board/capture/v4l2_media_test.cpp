@@ -36,7 +36,7 @@ class Media : public VividTest {
 
 TEST_F(Media, TheSensorIsSetToTheFormatAndSizeThatAreWanted) {
   std::vector<std::string> notes;
-  for (const char* const format : {"rggb8", "bggr10", "rgb24", "bgr24"}) {
+  for (const char* const format : {"rggb8", "bggr10", "grbg8"}) {
     for (const int width : {640, 320}) {
       const auto camera = started(vimc(kRaw, format, width, width * 3 / 4), &notes);
       EXPECT_THAT(camera->info().model, HasSubstr("Sensor A"));
@@ -66,6 +66,12 @@ TEST_F(Media, AWayThroughDebayerAndScalerIsConnectedForEitherSensor) {
     EXPECT_EQ(camera->info().format, PixelFormat::kRgb8);
     EXPECT_FALSE(nth_frame(*camera, 3).damaged);
   }
+}
+
+// The sensor's other, fixed link goes to a debayer, which takes mosaics alone.
+TEST_F(Media, WhatAFixedNeighbourDoesNotTakeIsRefusedAtTheStart) {
+  EXPECT_THAT(refusal([&] { (void)started(vimc(kRaw, "rgb24", 640, 480)); }),
+              AllOf(HasSubstr("its parts do not fit together"), HasSubstr("media-ctl -p")));
 }
 
 TEST_F(Media, ASensorThatIsNotThereIsRefusedWithThoseThatAre) {
