@@ -188,7 +188,8 @@ std::size_t Layout::offset() const noexcept {
 Layout set_layout(const Device& device, bool planes_interface, const Settings& wanted, const std::string& name) {
   Format current(planes_interface);
   if (const int error = device.ask(VIDIOC_G_FMT, current.raw); error != 0) {
-    refuse(name, std::string("does not tell its format: ") + error_text(error));
+    refuse(name,
+           std::string("has no format (") + error_text(error) + "): start what writes into it, or plug it in anew");
   }
   const bool any_size = wanted.width == 0 && wanted.height == 0;
   const int width = any_size ? current.width() : wanted.width;
