@@ -124,6 +124,7 @@ class Pictures : public VividTest {
     EXPECT_EQ(picture.stride_bytes, 640);
     // The ramp goes from side to side of the picture, and around it there is nothing.
     EXPECT_LT(picture.row(0)[0], 20);
+    EXPECT_GT(picture.row(0)[319], 235);
     EXPECT_GT(picture.row(239)[319], 235);
     EXPECT_LT(picture.row(239)[320], 20);
     EXPECT_LT(*(picture.row(-1) + 319), 20);
