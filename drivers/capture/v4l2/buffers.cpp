@@ -62,7 +62,8 @@ void Buffers::request(std::size_t wanted, const std::string& name) {
   }
   if (request.count < kFewest) {
     refuse(name, "gives " + std::to_string(request.count) + " of " + std::to_string(wanted) +
-                     " buffers, which are too few: choose a smaller size, or give the kernel more memory (cma=)");
+                     " buffers, which are too few: choose a smaller size, give the kernel more memory (cma=) or its "
+                     "driver more buffers");
   }
   count_ = std::min<std::size_t>(request.count, kMost);
 }

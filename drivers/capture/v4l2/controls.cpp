@@ -233,7 +233,8 @@ SensorControls set_controls(const Settings& wanted, std::span<const Device* cons
                                           V4L2_EXPOSURE_MANUAL, "exposure", notes);
   controls.auto_gain_ = set_automatic(devices, V4L2_CID_AUTOGAIN, wanted.gain.has_value(), 0, "gain", notes);
   // Some let the exposure slow the frame rate down.
-  (void)set_automatic(devices, V4L2_CID_EXPOSURE_AUTO_PRIORITY, true, 0, "frame rate", notes);
+  const bool steady = wanted.fps > 0 || wanted.exposure_us.has_value();
+  (void)set_automatic(devices, V4L2_CID_EXPOSURE_AUTO_PRIORITY, steady, 0, "frame rate", notes);
 
   auto exposure = place(devices, V4L2_CID_EXPOSURE_ABSOLUTE);
   controls.exposure_unit_us_ = 100;

@@ -19,15 +19,6 @@ std::string text_of(const unsigned char (&text)[N]) {
   return {text, end};
 }
 
-std::string list_of(std::span<const Node> nodes) {
-  std::string list;
-  for (const Node& node : nodes) {
-    if (!node.problem.empty() || !can_capture(node)) continue;
-    list += (list.empty() ? "" : ", ") + node.path + " (bus:" + node.bus + ", name:" + node.card + ")";
-  }
-  return list.empty() ? "there is no camera at all" : "there is " + list;
-}
-
 /// N of /dev/videoN; -1: another name.
 int number_of(const std::string& name) {
   constexpr std::string_view kStem = "video";
@@ -86,10 +77,19 @@ std::vector<Node> list_nodes() {
   return nodes;
 }
 
+std::string cameras_text(std::span<const Node> nodes) {
+  std::string list;
+  for (const Node& node : nodes) {
+    if (!node.problem.empty() || !can_capture(node)) continue;
+    list += (list.empty() ? "" : ", ") + node.path + " (bus:" + node.bus + ", name:" + node.card + ")";
+  }
+  return list.empty() ? "there is no camera at all" : "there is " + list;
+}
+
 std::string choose_node(const std::string& name, std::span<const Node> nodes) {
   const bool by_bus = name.starts_with("bus:");
   if (!by_bus && !name.starts_with("name:")) {
-    refuse(name, "want /dev/videoN, a link to it, bus:BUS or name:CARD; " + list_of(nodes));
+    refuse(name, "want /dev/videoN, a link to it, bus:BUS or name:CARD; " + cameras_text(nodes));
   }
   const std::string wanted = name.substr(name.find(':') + 1);
   const Node* found = nullptr;
@@ -97,13 +97,13 @@ std::string choose_node(const std::string& name, std::span<const Node> nodes) {
     if (!node.problem.empty() || !can_capture(node) || (by_bus ? node.bus : node.card) != wanted) continue;
     if (found != nullptr) {
       refuse(name, std::string("several are ") + (by_bus ? "on that bus" : "called that") + ": name one by its path" +
-                       (by_bus ? "" : " or bus") + "; " + list_of(nodes));
+                       (by_bus ? "" : " or bus") + "; " + cameras_text(nodes));
     }
     found = &node;
   }
   if (found != nullptr) return found->path;
   const auto closed = std::find_if(nodes.begin(), nodes.end(), [](const Node& n) { return !n.problem.empty(); });
-  refuse(name, std::string("none is ") + (by_bus ? "on that bus" : "called that") + "; " + list_of(nodes) +
+  refuse(name, std::string("none is ") + (by_bus ? "on that bus" : "called that") + "; " + cameras_text(nodes) +
                    (closed == nodes.end() ? std::string() : "; " + closed->problem));
 }
 
@@ -113,7 +113,7 @@ std::string find_node(const std::string& name) {
   }
   std::error_code error;
   const fs::path path = fs::canonical(name, error);
-  if (error) refuse(name, "is not there: plug it in, or load its driver; " + list_of(list_nodes()));
+  if (error) refuse(name, "is not there: plug it in, or load its driver; " + cameras_text(list_nodes()));
   return path.string();
 }
 

@@ -29,6 +29,9 @@ struct Node {
 /// All /dev/videoN, by number.
 [[nodiscard]] std::vector<Node> list_nodes();
 
+/// For messages: "there is /dev/video0 (bus:..., name:...), ...", or that there is none.
+[[nodiscard]] std::string cameras_text(std::span<const Node> nodes);
+
 /// The path of the one that is meant by bus:BUS or name:CARD. Throws std::runtime_error with one line that lists what
 /// there is: none or several of that name, or one that may not be asked.
 [[nodiscard]] std::string choose_node(const std::string& name, std::span<const Node> nodes);

@@ -44,17 +44,28 @@ struct Format {
       raw.fmt.pix.field = V4L2_FIELD_NONE;
     }
   }
+  /// Of what the driver has answered: its colour space is needed to say more of it.
+  void want_full_range() {
+    if (planes()) {
+      raw.fmt.pix_mp.flags |= V4L2_PIX_FMT_FLAG_SET_CSC;
+      raw.fmt.pix_mp.quantization = V4L2_QUANTIZATION_FULL_RANGE;
+    } else {
+      raw.fmt.pix.priv = V4L2_PIX_FMT_PRIV_MAGIC;
+      raw.fmt.pix.flags |= V4L2_PIX_FMT_FLAG_SET_CSC;
+      raw.fmt.pix.quantization = V4L2_QUANTIZATION_FULL_RANGE;
+    }
+  }
 };
 
 std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
 
-std::string list_text(std::span<const std::uint32_t> offered) {
+std::string list_text(std::span<const OfferedFormat> offered) {
   std::string usable;
   std::string other;
-  for (const std::uint32_t fourcc : offered) {
-    const KnownFormat* const known = find_format(fourcc);
+  for (const OfferedFormat& format : offered) {
+    const KnownFormat* const known = find_format(format.fourcc);
     std::string& list = known != nullptr ? usable : other;
-    list += (list.empty() ? "" : ", ") + (known != nullptr ? std::string(known->name) : fourcc_text(fourcc));
+    list += (list.empty() ? "" : ", ") + (known != nullptr ? std::string(known->name) : fourcc_text(format.fourcc));
   }
   if (usable.empty()) return "it offers none that can be used, only " + (other.empty() ? "nothing" : other);
   return "it offers " + usable;
@@ -177,33 +188,42 @@ std::size_t Layout::offset() const noexcept {
 Layout set_layout(const Device& device, bool planes_interface, const Settings& wanted, const std::string& name) {
   Format current(planes_interface);
   if (const int error = device.ask(VIDIOC_G_FMT, current.raw); error != 0) {
-    refuse(name, std::string("does not tell its format: ") + error_text(error));
+    refuse(name,
+           std::string("has no format (") + error_text(error) + "): start what writes into it, or plug it in anew");
   }
   const bool any_size = wanted.width == 0 && wanted.height == 0;
   const int width = any_size ? current.width() : wanted.width;
   const int height = any_size ? current.height() : wanted.height;
 
-  const std::vector<std::uint32_t> offered = list_formats(device, planes_interface);
-  const auto is_offered = [&](const KnownFormat& known) {
-    return std::find(offered.begin(), offered.end(), known.fourcc) != offered.end();
+  const std::vector<OfferedFormat> offered = list_formats(device, planes_interface);
+  struct Candidate {
+    const KnownFormat* known = nullptr;
+    bool range_choice = false;
   };
-  std::vector<const KnownFormat*> candidates;
+  std::vector<Candidate> candidates;
+  const auto consider = [&](const KnownFormat& known) {
+    const auto found = std::find_if(offered.begin(), offered.end(),
+                                    [&](const OfferedFormat& format) { return format.fourcc == known.fourcc; });
+    if (found != offered.end()) candidates.push_back({&known, found->range_choice});
+  };
   if (wanted.format == "auto") {
-    for (const KnownFormat& known : known_formats()) {
-      if (is_offered(known)) candidates.push_back(&known);
-    }
+    for (const KnownFormat& known : known_formats()) consider(known);
   } else {
     const KnownFormat* const known = find_format(std::string_view(wanted.format));
     if (known == nullptr) refuse(name, "no format is called " + wanted.format + "; " + list_text(offered));
-    if (is_offered(*known)) candidates.push_back(known);
+    consider(*known);
   }
   if (candidates.empty()) refuse(name, "has no format " + wanted.format + "; " + list_text(offered));
 
   std::string first_reason;
-  for (const KnownFormat* const known : candidates) {
+  for (const auto& [known, range_choice] : candidates) {
     Format made(planes_interface);
     made.want(known->fourcc, width, height);
-    const int error = device.ask(VIDIOC_S_FMT, made.raw);
+    int error = device.ask(VIDIOC_S_FMT, made.raw);
+    if (error == 0 && range_choice) {
+      made.want_full_range();
+      error = device.ask(VIDIOC_S_FMT, made.raw);
+    }
     if (error == EBUSY) {
       refuse(name, "busy: another program streams from it (fuser -v /dev/video* tells which): stop that");
     }
@@ -264,15 +284,15 @@ std::optional<std::chrono::nanoseconds> shortest_period(const Device& device, st
   return shortest;
 }
 
-std::vector<std::uint32_t> list_formats(const Device& device, bool planes_interface) {
-  std::vector<std::uint32_t> formats;
+std::vector<OfferedFormat> list_formats(const Device& device, bool planes_interface) {
+  std::vector<OfferedFormat> formats;
   v4l2_fmtdesc query{};
   for (std::uint32_t index = 0;; ++index) {
     query = {};
     query.index = index;
     query.type = planes_interface ? V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE : V4L2_BUF_TYPE_VIDEO_CAPTURE;
     if (device.ask(VIDIOC_ENUM_FMT, query) != 0) return formats;
-    formats.push_back(query.pixelformat);
+    formats.push_back({query.pixelformat, (query.flags & V4L2_FMT_FLAG_CSC_QUANTIZATION) != 0});
   }
 }
 

@@ -32,7 +32,8 @@ struct Layout {
   [[nodiscard]] std::size_t offset() const noexcept;
 };
 
-/// Sets format and size as wanted, or the best that can be had. Throws std::runtime_error, one line: a format or size
+/// Sets format and size as wanted, or the best that can be had; of full range, which grey and RGB have, too, where that
+/// can be chosen. Throws std::runtime_error, one line: a format or size
 /// that the driver does not offer (and which it does), fields in turn, planes that do not make one picture.
 [[nodiscard]] Layout set_layout(const Device& device, bool planes_interface, const Settings& wanted,
                                 const std::string& name);
@@ -45,8 +46,12 @@ struct Layout {
 [[nodiscard]] std::optional<std::chrono::nanoseconds> shortest_period(const Device& device, std::uint32_t fourcc,
                                                                       int width, int height);
 
-/// What is offered, for people: "GREY, YUYV".
-[[nodiscard]] std::vector<std::uint32_t> list_formats(const Device& device, bool planes_interface);
+/// A format that the driver offers.
+struct OfferedFormat {
+  std::uint32_t fourcc = 0;
+  bool range_choice = false;  ///< full or limited range of its brightness is ours to choose
+};
+[[nodiscard]] std::vector<OfferedFormat> list_formats(const Device& device, bool planes_interface);
 
 /// A size, or a range of them, that a format can have.
 struct OfferedSize {

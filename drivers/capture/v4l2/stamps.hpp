@@ -41,10 +41,10 @@ class SequenceCount {
 
 /// A driver's stamps as times of one clock that never goes back: CLOCK_MONOTONIC, which is what they promise to be.
 ///
-/// What a stamp is expected to be: later than the last, and at most an hour before it was taken. Where it is not,
-/// the count may have come round: of seconds in 32 bits, microseconds in 32 bits or nanoseconds in 64 (which the
-/// arithmetic undoes by itself). What no such count explains is a step: the time then goes on from when the frame was
-/// taken, and stamps are measured from there. A first stamp that is not near the monotonic clock is a step, too.
+/// What a stamp is expected to be: later than the last, and from an hour before it was taken to a second after. Where
+/// it is not, the count may have come round: of seconds in 32 bits, microseconds in 32 bits or nanoseconds in 64 (which
+/// the arithmetic undoes by itself). What no such count explains is a step: the time then goes on from when the frame
+/// was taken, and stamps are measured from there. A first stamp that is not near the monotonic clock is a step, too.
 /// One thread.
 class StampLine {
  public:
@@ -67,7 +67,7 @@ class StampLine {
   static constexpr Count kSecond = 1'000'000'000;
   static constexpr Count kHour = 3600 * kSecond;
   static constexpr Count kHalf = ~Count{0} / 2;
-  static constexpr Count kSlack = kSecond / 1000;  // driver and we read the clock on two cores
+  static constexpr Count kSlack = kSecond;  // some drivers stamp the end of a frame before it has come
 
   static Count count(std::chrono::nanoseconds time) noexcept { return static_cast<Count>(time.count()); }
   static std::chrono::nanoseconds time(Count count) noexcept {

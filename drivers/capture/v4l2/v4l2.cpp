@@ -9,6 +9,7 @@
 #include "drivers/capture/v4l2/controls.hpp"
 #include "drivers/capture/v4l2/discovery.hpp"
 #include "drivers/capture/v4l2/layout.hpp"
+#include "drivers/capture/v4l2/media.hpp"
 #include "drivers/capture/v4l2/stream.hpp"
 
 namespace stereotrack::capture::v4l2 {
@@ -41,7 +42,7 @@ CameraFacts facts_of(const Node& node) {
   Device device;
   if (!node.problem.empty() || device.open(node.path) != 0) return facts;
   facts.links = links_to(node.path);
-  for (const std::uint32_t fourcc : list_formats(device, has_planes(node))) {
+  for (const auto& [fourcc, range_choice] : list_formats(device, has_planes(node))) {
     CameraFacts::Format& format = facts.formats.emplace_back();
     format.fourcc = fourcc_text(fourcc);
     if (const KnownFormat* const known = find_format(fourcc)) format.name = known->name;
@@ -67,20 +68,28 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
   if (const int error = parts.node.open(path); error != 0) refuse(settings.device, open_refusal(path, error));
   const Node node = describe(parts.node, path);
   if (!node.problem.empty() || !can_capture(node)) {
-    refuse(name, "is no camera: nothing can be captured from it; stereotrack doctor lists what can");
+    refuse(name, "is no camera: nothing can be captured from it; " + cameras_text(list_nodes()));
   }
 
   std::vector<std::string> told;
-  parts.layout = set_layout(parts.node, has_planes(node), settings, name);
+  Settings wanted = settings;
+  std::optional<SensorPart> sensor = connect_sensor(parts.node, node, wanted, name);
+  parts.layout = set_layout(parts.node, has_planes(node), wanted, name);
   const Layout& layout = parts.layout;
   const std::uint32_t fourcc = layout.format->fourcc;
-  auto period = set_period(parts.node, layout, settings.fps, told);
+  const Device& exposes = sensor ? sensor->device : parts.node;
+  const LineTiming timing = sensor ? line_timing(exposes, sensor->width, sensor->height)
+                                   : line_timing(exposes, layout.frame_width, layout.frame_height);
+  auto period = sensor ? set_sensor_period(exposes, timing, settings.fps, told) : std::nullopt;
+  if (!period) period = set_period(parts.node, layout, settings.fps, told);
   if (!period && settings.fps > 0) period = from_us(1e6 / settings.fps);
   if (!period) refuse(name, "the driver does not tell its frame rate: set it (fps)");
 
-  const Device* const devices[] = {&parts.node};
-  const LineTiming timing = line_timing(parts.node, layout.frame_width, layout.frame_height);
-  parts.controls = set_controls(settings, devices, node.card, timing, told);
+  std::vector<const Device*> devices;
+  if (sensor) devices.push_back(&exposes);
+  devices.push_back(&parts.node);
+  parts.controls = set_controls(settings, devices, sensor ? sensor->name : node.card, timing, told);
+  parts.controls_on_sensor = sensor && parts.controls.device() == 0;
   parts.control_delay_frames = settings.control_delay_frames;
 
   if (settings.readout_us) {
@@ -92,7 +101,8 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
   parts.readout_guess = std::min(*period, shortest ? *shortest : *period);
 
   parts.info.name = name;
-  parts.info.model = node.card + ", " + node.bus;
+  parts.info.model = (sensor ? sensor->name : node.card) + ", " + node.bus;
+  if (sensor) parts.sensor = std::move(sensor->device);
   parts.info.width = layout.width;
   parts.info.height = layout.height;
   parts.info.format = layout.format->format;

@@ -20,9 +20,11 @@ enum class Memory : std::uint8_t {
 
 /// What is wanted of one sensor. What is not said stays as the driver has it.
 struct Settings {
-  std::string device;           ///< /dev/video0, a link to it (/dev/v4l/by-path/...), bus:platform:vivid-000, name:CARD
-  int width = 0;                ///< [px]; 0 with height 0: as the driver has it
-  int height = 0;               ///< [px]
+  std::string device;  ///< /dev/video0, a link to it (/dev/v4l/by-path/...), bus:platform:vivid-000, name:CARD
+  std::string sensor;  ///< where the driver has the program connect the camera's parts (media controller): the sensor's
+                       ///< name, or how it begins. Empty: the one that is connected, or the nearest
+  int width = 0;       ///< [px]; 0 with height 0: as the driver has it
+  int height = 0;      ///< [px]
   std::string format = "auto";  ///< a name of format_names(); auto: grey, where there is none the cheapest to read
   double fps = 0;               ///< 0: as the driver has it
   int buffers = 8;              ///< wanted; the driver may need more. FramePool's slots and two, at least
