@@ -98,6 +98,46 @@ TEST(Stereotrackd, ChecksItsConfigurationAndStartsNothing) {
   EXPECT_FALSE(fs::exists(folder / "state"));
 }
 
+TEST(Stereotrackd, ChecksASceneWithoutDrawingIt) {
+  const TempDir folder;
+  // Drawn, it would take 9 GB and half an hour.
+  const ProgramResult done = run_program({kDaemon, "--config", small(folder.path()), "--check-config", "--set",
+                                          "synthetic.frames=10000", "--set", "synthetic.width=640", "--set",
+                                          "synthetic.height=480", "--set", "source.memory_mb=1000000"});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_NE(done.out.find("640x480"), std::string::npos) << done.out;
+  const ProgramResult large = run_program({kDaemon, "--config", small(folder.path()), "--check-config", "--set",
+                                           "synthetic.frames=10000", "--set", "source.memory_mb=1"});
+  EXPECT_EQ(large.exit_code, 1);
+  EXPECT_NE(large.err.find("source.memory_mb"), std::string::npos) << large.err;
+}
+
+TEST(Stereotrackd, CamerasThatAreNotThereAreALineEach) {
+  const TempDir folder;
+  const std::string config = small(folder.path());
+  const std::vector<std::string> cameras{
+      kDaemon, "--config", config, "--set", "source.name=cameras", "--set", "camera.left.device=/dev/no-camera",
+      "--set"};
+  const auto with = [&](const std::string& set, bool check) {
+    std::vector<std::string> all = cameras;
+    all.push_back(set);
+    if (check) all.emplace_back("--check-config");
+    return run_program(all);
+  };
+  for (const bool check : {true, false}) {
+    const ProgramResult mono = with("camera.right.device=", check);
+    EXPECT_EQ(mono.exit_code, 1);
+    EXPECT_NE(mono.err.find("/dev/no-camera"), std::string::npos) << mono.err;
+    EXPECT_EQ(std::count(mono.err.begin(), mono.err.end(), '\n'), 1) << mono.err;
+    const ProgramResult format = with("camera.format=png", check);
+    EXPECT_EQ(format.exit_code, 2);
+    EXPECT_NE(format.err.find("camera.format: "), std::string::npos) << format.err;
+    const ProgramResult stereo = with("camera.right.device=/dev/no-other", check);
+    EXPECT_EQ(stereo.exit_code, 2);
+    EXPECT_NE(stereo.err.find("calibration.file: "), std::string::npos) << stereo.err;
+  }
+}
+
 TEST(Stereotrackd, BadConfigurationIsOneLineAndExitCodeTwo) {
   const TempDir folder;
   struct Case {

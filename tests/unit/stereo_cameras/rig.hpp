@@ -66,31 +66,31 @@ class ScriptedTrigger final : public trigger::Trigger {
 
 /// Two sensors, the source over them, and what stands behind it in the daemon.
 struct CameraRig {
-  explicit CameraRig(const capture::StereoCameras::Config& config, bool counts_lost = false, std::size_t slots = 4,
+  explicit CameraRig(const capture::StereoCameras::Config& wanted, bool counts_lost = false, std::size_t slots = 4,
                      std::size_t buffers = 8)
       : left(camera_info("left-device", counts_lost, buffers)),
         right(camera_info("right-device", counts_lost, buffers)),
         pool(slots),
         outlet(pool, notices, bell),
-        config_(config) {}
+        config(wanted) {}
 
   void open() {
     cameras = std::make_unique<capture::StereoCameras>(
-        [this](trigger::Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config_);
+        [this](trigger::Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config);
   }
   /// The trigger belongs to the source.
   ScriptedTrigger& open_with_trigger() {
     auto trigger = std::make_unique<ScriptedTrigger>();
     ScriptedTrigger& pulses = *trigger;
     cameras = std::make_unique<capture::StereoCameras>(
-        [this](trigger::Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config_,
+        [this](trigger::Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config,
         std::move(trigger));
     return pulses;
   }
   SensorScript& sensor(trigger::Side side) { return side == trigger::Side::kLeft ? left : right; }
 
   /// A step that waits for nothing.
-  void step() { (void)cameras->step(outlet, config_.now != nullptr ? config_.now() : MonotonicTime()); }
+  void step() { (void)cameras->step(outlet, config.now != nullptr ? config.now() : MonotonicTime()); }
 
   /// Both expose number n, whole; the right one `skew` later.
   void expose_both(std::uint64_t n, std::chrono::nanoseconds skew = {}) {
@@ -114,7 +114,7 @@ struct CameraRig {
   capture::PairOutlet::Notices notices;
   capture::Doorbell bell;
   capture::PairOutlet outlet;
-  capture::StereoCameras::Config config_;
+  capture::StereoCameras::Config config;
   std::unique_ptr<capture::StereoCameras> cameras;
 };
 
