@@ -32,6 +32,7 @@ enum class CameraDriver : unsigned char { kV4l2 };
 
 struct CameraDeviceConfig {
   std::string device;  ///< as the driver names it
+  std::string sensor;  ///< empty: the one that is connected, or the nearest
 };
 
 /// The cameras of source.name = "cameras"; no other source looks at it. See drivers/capture/stereo_cameras.

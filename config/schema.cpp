@@ -61,7 +61,11 @@ std::vector<Key> keys_of(Configuration& c) {
       key("camera.left.device", c.camera.left.device, nullptr,
           "The left camera, for source.name = \"cameras\": /dev/video0, a link to it that does not change with the "
           "order of plugging in (/dev/v4l/by-path/...), or bus:NAME, name:CARD."),
+      key("camera.left.sensor", c.camera.left.sensor, nullptr,
+          "Its sensor's name, or how it begins, where the driver has the program connect the camera's parts (media "
+          "controller) and there are several; empty: the one that is connected, or the nearest."),
       key("camera.right.device", c.camera.right.device, nullptr, "The right one; empty: one camera, in mono."),
+      key("camera.right.sensor", c.camera.right.sensor, nullptr, "Likewise."),
       key("camera.width", c.camera.width, 16, 8192, "px", "Width of the pictures of each camera."),
       key("camera.height", c.camera.height, 16, 8192, "px", "Height of them."),
       key("camera.format", c.camera.format, nullptr,

@@ -41,7 +41,9 @@ std::string line_of(Side side, const capture::CameraInfo& info) {
 
 capture::v4l2::Settings camera_settings(const config::CameraConfig& camera, Side side) {
   capture::v4l2::Settings settings;
-  settings.device = side == Side::kLeft ? camera.left.device : camera.right.device;
+  const config::CameraDeviceConfig& of_side = side == Side::kLeft ? camera.left : camera.right;
+  settings.device = of_side.device;
+  settings.sensor = of_side.sensor;
   settings.width = camera.width;
   settings.height = camera.height;
   settings.format = camera.format;

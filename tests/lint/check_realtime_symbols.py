@@ -34,6 +34,12 @@ ROOTS_OF_THREADS = [
     "stereotrack::daemon::FrameLoop::stage_ended(",
     "stereotrack::capture::Film::step(",
     "stereotrack::capture::Film::clock_map(",
+    "stereotrack::capture::StereoCameras::step(",
+    "stereotrack::capture::StereoCameras::figures(",
+    "stereotrack::capture::v4l2::Stream::take(",
+    "stereotrack::capture::v4l2::Stream::give_back(",
+    "stereotrack::capture::v4l2::Stream::picture(",
+    "stereotrack::capture::v4l2::Stream::counters(",
     "stereotrack::telemetry::UdpSender::send(",
     "stereotrack::gpio::gpiod::(anonymous namespace)::Request::set(",
     "stereotrack::gpio::simulated_chip::(anonymous namespace)::Request::set(",
@@ -57,7 +63,7 @@ SET_UP = [
 
 THREADS = [
     r"clock_gettime|clock_nanosleep|adjtimex",
-    r"syscall|poll|sendto|sendmsg|write|ioctl",  # futexes, datagrams, lines
+    r"syscall|ppoll|sendto|ioctl",  # futexes, frames, datagrams
     r"__errno_location",
     r"stereotrack::allocations_of_this_thread\(\)",  # the program's own count
     r"pb_(encode|get_encoded_size|ostream_from_buffer)",  # nanopb: into the caller's memory, no heap

@@ -1,0 +1,75 @@
+#!/bin/bash
+# stereotrackd on two cameras of the kernel's: pairs from their own buffers, one unplugged and plugged in again, both gone.
+# wants: bin/stereotrackd bin/stereotrack
+# limit: 300
+# shellcheck source=tests/system/board/guest/tap.sh
+source /payload/.board/tap.sh
+
+cat >/run/rig.toml <<END
+[source]
+name = "cameras"
+[camera]
+left.device = "bus:platform:vivid-000"
+right.device = "bus:platform:vivid-001"
+width = 320
+height = 180
+format = "grey8"
+fps = 10.0
+tolerance = 0.5
+timeout_ms = 1000
+[calibration]
+file = "/run/scene/calibration.yml"
+[latency]
+output_ms = 150.0
+[metrics]
+file = "/run/results/figures.prom"
+END
+
+start() {
+  systemd-run --unit=stereotrackd --property=Type=notify --property=StateDirectory=stereotrack \
+    /payload/stereotrackd --config /run/rig.toml
+}
+figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
+over() { (($(figure "$1") > $2)); }
+rises() {
+  local before
+  before=$(figure "$1") && eventually over "$1" "$before"
+}
+says() { journalctl -u stereotrackd -o cat | grep -E "$1"; }
+unplug() { for camera in "$@"; do echo "vivid.$camera" >/sys/bus/platform/drivers/vivid/unbind; done; }
+plug_in() { for camera in "$@"; do echo "vivid.$camera" >/sys/bus/platform/drivers/vivid/bind; done; }
+is_there() { [[ $(figure "stereotrack_camera_silent{camera=\"$1\"}") == 0 ]]; }
+paired='stereotrack_pairing_total{verdict="paired"}'
+
+fact "a scene of that size brings a calibration" \
+  /payload/stereotrack synth eleven --out /run/scene --frames 1 --size 320x180
+fact "both cameras can do what is asked of them" /payload/stereotrackd --config /run/rig.toml --check-config
+fact "it starts on both" start
+fact "pairs come" eventually over "$paired" 5
+fact "and leave on time" eventually over 'stereotrack_outputs_total{cause="on_time"}' 5
+fact "the capture thread asked the heap for nothing" test "$(figure 'stereotrack_allocations_total{thread="capture"}')" = 0
+
+fact "the right camera is unplugged" unplug 1
+fact "that is told, with its name" eventually says 'right camera: .*vivid.*goes on in mono'
+fact "left pictures go on alone" rises stereotrack_mono_pairs_total
+fact "it is plugged in again" plug_in 1
+fact "that is told, too" eventually says 'right camera: is back'
+fact "pairs come again" rises "$paired"
+
+fact "both are unplugged" unplug 0 1
+fact "the left one is told of" eventually says 'left camera: .*vivid.*predicted until'
+fact "the daemon lives on" systemctl is-active stereotrackd
+fact "they are plugged in again" plug_in 0 1
+fact "the left one is back" eventually is_there left
+fact "the right one is back" eventually is_there right
+fact "pairs come for the third time" rises "$paired"
+fact "a fatal error of the stream is a camera lost" v4l2-ctl -d1 -c inject_fatal_streaming_error=1
+fact "which comes back by itself" eventually over 'stereotrack_camera_reopened_total{camera="right"}' 2
+fact "and pairs with it" rises "$paired"
+fact "it is the process that was started" test "$(systemctl show stereotrackd -p NRestarts --value)" = 0
+grep -E '^stereotrack_(camera|pairing|mono|outputs|frames)' /run/results/figures.prom | tell
+
+fact "it ends when it is asked to" systemctl stop stereotrackd
+fact "without a failure" test -z "$(systemctl --failed --no-legend)"
+journalctl -u stereotrackd -o cat | tell
+finish
