@@ -250,12 +250,12 @@ SensorControls set_controls(const Settings& wanted, std::span<const Device* cons
                                                          controls.exposure_unit_us_, "exposure", " us", notes)
                                             : read_control(device, exposure->control.id);
   } else if (place(devices, V4L2_CID_EXPOSURE)) {
-    notes.push_back(
+    notes.emplace_back(
         "its exposure is in rows, and the driver does not tell how long a row takes: exposure is left alone, and half "
         "of "
         "it is missing in capture times");
   } else {
-    notes.push_back(
+    notes.emplace_back(
         "the driver has no control of the exposure: it cannot be set, and half of it is missing in capture times");
   }
 
@@ -286,14 +286,14 @@ SensorControls set_controls(const Settings& wanted, std::span<const Device* cons
       controls.gain_ = read_control(device, gain->control.id);
     }
   } else if (wanted.gain) {
-    notes.push_back("the driver has no control of the gain: it cannot be set");
+    notes.emplace_back("the driver has no control of the gain: it cannot be set");
   }
 
   if (wanted.black_level) {
     if (const auto black = place(devices, V4L2_CID_BLACK_LEVEL)) {
       (void)set_number(*devices[black->device], black->control, *wanted.black_level, 1, "black level", "", notes);
     } else {
-      notes.push_back("the driver has no control of the black level: it cannot be set");
+      notes.emplace_back("the driver has no control of the black level: it cannot be set");
     }
   }
 

@@ -1,9 +1,9 @@
 #include <linux/videodev2.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <ctime>
 
 #include "drivers/capture/v4l2/stream.hpp"
 
