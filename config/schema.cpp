@@ -71,10 +71,9 @@ std::vector<Key> keys_of(Configuration& c) {
       key("camera.format", c.camera.format, nullptr,
           "How pictures lie in memory, such as grey8, yuyv, nv12, rggb10p; auto: grey, else what is cheapest to read."),
       key("camera.fps", c.camera.fps, 0.1, 1000, "1/s", "Frames a second of each camera."),
-      key("camera.buffers", c.camera.buffers, 6, 64, "",
+      key("camera.buffers", c.camera.buffers, 6, 32, "",
           "Buffers of each camera: four pairs may be on their way, two are the driver's, the others let frames wait "
-          "for "
-          "their partners."),
+          "for their partners."),
       key("camera.exposure_us", c.camera.exposure_us, 0, 1e7, "us", "Exposure of both; 0: automatic, each by itself."),
       key("camera.gain", c.camera.gain, 0, 1000, "", "Gain of both, 1 is none; 0: automatic, each by itself."),
       key("camera.black_level", c.camera.black_level, -1, 65535, "",

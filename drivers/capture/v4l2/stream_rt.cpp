@@ -53,7 +53,7 @@ void Stream::give_back(std::uint32_t buffer) noexcept {
 }
 
 void Stream::queue_again() noexcept {
-  for (std::uint32_t i = 0; refused_ >> i != 0; ++i) {
+  for (std::uint32_t i = 0; i < buffers_.size() && refused_ >> i != 0; ++i) {
     if ((refused_ >> i & 1U) != 0 && queue(i) == 0) refused_ &= ~(1U << i);
   }
 }
