@@ -69,64 +69,98 @@ void remap(ImageView<const std::uint8_t> raw, const RemapTable& table, int row, 
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Eight pixels at a time, whatever the vectors' length: a table look-up reaches 16 bytes.
-constexpr hn::FixedTag<std::uint8_t, 16> kBytes{};
-constexpr hn::FixedTag<std::uint8_t, 8> kHalf{};
-constexpr hn::FixedTag<std::uint16_t, 8> kWords{};
-constexpr hn::FixedTag<std::int16_t, 8> kSigned{};
-using Bytes = hn::Vec<decltype(kBytes)>;
-using SignedWords = hn::Vec<decltype(kSigned)>;
+// A table look-up reaches the 16 bytes of its part of the vector: a block's window for each part.
+constexpr hn::FixedTag<std::uint8_t, kWindowColumns> kWindow{};
+constexpr int kMostBlocks = hn::MaxLanes(hn::ScalableTag<std::uint8_t>()) >= 2 * kWindowColumns ? 2 : 1;
 
 // 32 times the mixture of each pair of bytes; at most 8160.
-SignedWords mixed(Bytes pairs, SignedWords a) {
-  const auto left = hn::BitCast(kSigned, even_bytes(pairs));
-  const auto right = hn::BitCast(kSigned, odd_bytes(pairs));
+template <class V, class A>
+A mixed(V pairs, A a) {
+  const hn::DFromV<A> d;
+  const auto left = hn::BitCast(d, even_bytes(pairs));
+  const auto right = hn::BitCast(d, odd_bytes(pairs));
   return hn::Add(hn::ShiftLeft<5>(left), hn::Mul(hn::Sub(right, left), a));
+}
+
+/// A row of the table, from a block on.
+struct Blocks {
+  const RawPixel* windows;
+  const std::uint8_t* places;
+  const std::uint16_t* fractions;
+  const std::uint8_t* mask;
+};
+
+// The pixels of neighbouring blocks, all of which have windows.
+template <Sampling kSampling, int kBlocks>
+auto map_together(ImageView<const std::uint8_t> raw, const Blocks& at) {
+  const hn::FixedTag<std::uint16_t, kBlocks * kBlock> words;
+  const hn::RebindToSigned<decltype(words)> as_signed;
+  const hn::Repartition<std::uint8_t, decltype(words)> bytes;
+  const hn::Rebind<std::uint8_t, decltype(words)> narrow;
+  const auto window_row = [&](int row) HWY_ATTR {
+    const auto of = [&](int block) HWY_ATTR {
+      return hn::LoadU(kWindow, raw.row(at.windows[block].y + row) + at.windows[block].x);
+    };
+    if constexpr (kBlocks == 2) {
+      return hn::Combine(bytes, of(1), of(0));
+    } else {
+      return of(0);
+    }
+  };
+  const auto place = hn::PromoteTo(words, hn::LoadU(narrow, at.places));
+  const auto column = hn::And(place, hn::Set(words, kWindowColumns - 1));
+  const auto pairs = hn::BitCast(bytes, hn::Or(column, hn::ShiftLeft<8>(hn::Add(column, hn::Set(words, 1)))));
+  const auto second = hn::TestBit(place, hn::Set(words, RemapTable::kSecondRow));
+  const auto look_up = [&](int row)
+                           HWY_ATTR { return hn::BitCast(words, hn::TableLookupBytes(window_row(row), pairs)); };
+  const auto row0 = look_up(0);
+  const auto row1 = look_up(1);
+  const auto row2 = look_up(2);
+  const auto fractions = hn::LoadU(words, at.fractions);
+  auto a = hn::And(fractions, hn::Set(words, kFractionMask));
+  auto b = hn::ShiftRight<RemapTable::kFractionBits>(fractions);
+  if (kSampling == Sampling::kNearest) {
+    const auto half = hn::Set(words, kSubPixels / 2);
+    a = hn::And(hn::Add(a, half), hn::Set(words, kSubPixels));
+    b = hn::And(hn::Add(b, half), hn::Set(words, kSubPixels));
+  }
+  const auto across = hn::BitCast(as_signed, a);
+  const auto top = mixed(hn::BitCast(bytes, hn::IfThenElse(second, row1, row0)), across);
+  const auto bottom = mixed(hn::BitCast(bytes, hn::IfThenElse(second, row2, row1)), across);
+  // (32 top + b (bottom - top) + 512) / 1024 = (top + b (bottom - top) / 32 + 16) / 32, each rounded down; the inner
+  // quotient is the upper half of 4 (bottom - top) 512 b, whose factors are below 2^15.
+  const auto shift = hn::MulHigh(hn::ShiftLeft<2>(hn::Sub(bottom, top)), hn::BitCast(as_signed, hn::ShiftLeft<9>(b)));
+  const auto sum = hn::Add(hn::Add(top, shift), hn::Set(as_signed, kSubPixels / 2));
+  return hn::And(hn::DemoteTo(narrow, hn::ShiftRight<5>(sum)), hn::LoadU(narrow, at.mask));
 }
 
 template <Sampling kSampling>
 void remap_blocks(ImageView<const std::uint8_t> raw, const RemapTable& table, int row, std::uint8_t* out) {
   const int width = table.corner.width;
-  const RawPixel* windows = table.window.row(row);
-  const std::uint8_t* places = table.place.row(row);
-  const std::uint16_t* fractions = table.fractions.row(row);
-  const std::uint8_t* mask = table.mask.row(row);
-  const auto half = hn::Set(kWords, kSubPixels / 2);
-  for (int u = 0; u < width; u += kBlock) {
-    const RawPixel window = windows[u / kBlock];
-    if (!window.valid()) {
+  for (int u = 0; u < width;) {
+    const Blocks at{table.window.row(row) + u / kBlock, table.place.row(row) + u, table.fractions.row(row) + u,
+                    table.mask.row(row) + u};
+    if constexpr (kMostBlocks == 2) {
+      if (u + 2 * kBlock <= width && at.windows[0].valid() && at.windows[1].valid()) {
+        hn::StoreU(map_together<kSampling, 2>(raw, at), hn::FixedTag<std::uint8_t, 2 * kBlock>(), out + u);
+        u += 2 * kBlock;
+        continue;
+      }
+    }
+    if (!at.windows[0].valid()) {
       remap_pixels(raw, table, row, kSampling, u, std::min(u + kBlock, width), out);
-      continue;
-    }
-    const std::uint8_t* first = raw.row(window.y) + window.x;
-    const auto place = hn::LoadU(kBytes, places + u);
-    const auto column = hn::And(place, hn::Set(kBytes, kWindowColumns - 1));
-    const auto pairs = hn::InterleaveLower(kBytes, column, hn::Add(column, hn::Set(kBytes, 1)));
-    const auto row_bit = hn::InterleaveLower(kBytes, place, place);
-    const auto second = hn::TestBit(row_bit, hn::Set(kBytes, RemapTable::kSecondRow));
-    const auto row0 = hn::TableLookupBytes(hn::LoadU(kBytes, first), pairs);
-    const auto row1 = hn::TableLookupBytes(hn::LoadU(kBytes, first + raw.stride), pairs);
-    const auto row2 = hn::TableLookupBytes(hn::LoadU(kBytes, first + 2 * raw.stride), pairs);
-    auto a = hn::And(hn::LoadU(kWords, fractions + u), hn::Set(kWords, kFractionMask));
-    auto b = hn::ShiftRight<RemapTable::kFractionBits>(hn::LoadU(kWords, fractions + u));
-    if (kSampling == Sampling::kNearest) {
-      a = hn::And(hn::Add(a, half), hn::Set(kWords, kSubPixels));
-      b = hn::And(hn::Add(b, half), hn::Set(kWords, kSubPixels));
-    }
-    const auto top = mixed(hn::IfThenElse(second, row1, row0), hn::BitCast(kSigned, a));
-    const auto bottom = mixed(hn::IfThenElse(second, row2, row1), hn::BitCast(kSigned, a));
-    // (32 top + b (bottom - top) + 512) / 1024 = (top + b (bottom - top) / 32 + 16) / 32, each rounded down; the inner
-    // quotient is the upper half of 4 (bottom - top) 512 b, whose factors are below 2^15.
-    const auto shift = hn::MulHigh(hn::ShiftLeft<2>(hn::Sub(bottom, top)), hn::BitCast(kSigned, hn::ShiftLeft<9>(b)));
-    const auto sum = hn::Add(hn::Add(top, shift), hn::Set(kSigned, kSubPixels / 2));
-    const auto value = hn::And(hn::DemoteTo(kHalf, hn::ShiftRight<5>(sum)), hn::LoadU(kHalf, mask + u));
-    if (u + kBlock <= width) {
-      hn::StoreU(value, kHalf, out + u);
     } else {
-      alignas(kBlock) std::uint8_t end[kBlock];
-      hn::Store(value, kHalf, end);
-      std::memcpy(out + u, end, static_cast<std::size_t>(width - u));
+      const hn::FixedTag<std::uint8_t, kBlock> block;
+      const auto value = map_together<kSampling, 1>(raw, at);
+      if (u + kBlock <= width) {
+        hn::StoreU(value, block, out + u);
+      } else {
+        alignas(kBlock) std::uint8_t end[kBlock];
+        hn::Store(value, block, end);
+        std::memcpy(out + u, end, static_cast<std::size_t>(width - u));
+      }
     }
+    u += kBlock;
   }
 }
 

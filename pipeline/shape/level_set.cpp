@@ -190,39 +190,43 @@ int LevelSet::sweep() noexcept {
 
   // Locals, which bytes written do not alias: the members would be read again after each.
   const std::int64_t weight = pair_weight();
-  const std::int32_t stride = stride_;
+  const std::ptrdiff_t stride = stride_;
   const std::uint8_t visit = visit_;
-  std::int8_t* const sides = side_.data();
+  const std::int8_t* const sides = side_.data();
   std::uint8_t* const queued = queued_.data();
   const std::uint8_t* const around = around_.data();
   const std::uint8_t* const values = feature_.data();
   const std::int32_t* const band = band_.data();
   std::int32_t* next = next_band_.data();
-  const auto queue = [&next, queued, visit](std::int32_t p) {
-    if (queued[p] == visit) return;
-    queued[p] = visit;
-    *next++ = p;
+  // No branches but the one on what changes, which is rare: others would be guessed wrong often. What is not wanted is
+  // written over by the next.
+  const auto queue = [&next, queued, visit](std::ptrdiff_t p, bool wanted) {
+    const std::uint8_t before = queued[p];
+    *next = static_cast<std::int32_t>(p);
+    next += static_cast<int>(wanted) & static_cast<int>(before != visit);
+    queued[p] = wanted ? visit : before;
   };
   int changed = 0;
   for (std::int32_t i = 0; i < band_size; ++i) {
-    const std::int32_t p = band[i];
-    const int side = sides[p] > 0 ? 1 : -1;  // what is in the band is on one of the two
+    const std::ptrdiff_t p = band[i];
+    const std::int8_t* const here = sides + p;
+    const int side = *here;  // what is in the band is on one of the two
     const int other = -side;
-    if (sides[p - 1] != other && sides[p + 1] != other && sides[p - stride] != other && sides[p + stride] != other) {
-      continue;
-    }
-    queue(p);
-    const std::uint8_t value = values[p];
+    const bool on_contour =
+        (here[-1] == other) | (here[1] == other) | (here[-stride] == other) | (here[stride] == other);
+    queue(p, on_contour);
+    const int value = values[p];
     // Neighbours on its side are parted from it, those on the other joined.
-    const int parted = side * (around[p] - kNoSum - side);
-    if (side * worth(value) + weight * parted >= 0) continue;
+    const int parted = around[p] - kNoSum - side;
+    const bool gains = side * (worth(value) + weight * parted) < 0;
+    if (!(on_contour & gains)) continue;
     in_.add(-side, -side * value, -side * value * value);
     out_.add(side, side * value, side * value * value);
-    parted_ += parted;
-    flip(p);
+    parted_ += side * parted;
+    flip(static_cast<std::int32_t>(p));
     ++changed;
-    for (const std::int32_t neighbour : {p - stride, p - 1, p + 1, p + stride}) {
-      if (sides[neighbour] != kNone) queue(neighbour);
+    for (const std::ptrdiff_t neighbour : {p - stride, p - 1, p + 1, p + stride}) {
+      queue(neighbour, sides[neighbour] != kNone);
     }
   }
   next_size_ = static_cast<std::int32_t>(next - next_band_.data());

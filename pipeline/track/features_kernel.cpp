@@ -10,6 +10,31 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#ifndef STEREOTRACK_FEATURES_KERNEL_SHARED
+#define STEREOTRACK_FEATURES_KERNEL_SHARED
+namespace stereotrack {
+namespace {
+
+// Of best_place().
+std::int32_t cost_at(const Patch& patch, ImageView<const std::uint8_t> luma, int x, int y) noexcept {
+  const auto apart = [&](int u, int v) {
+    return patch[static_cast<std::size_t>(v * kPatchSide + u)] - luma.at(x + u - kPatchReach, y + v - kPatchReach);
+  };
+  int shift = 0;
+  for (int v = 0; v < kPatchSide; ++v) {
+    for (int u = 0; u < kPatchSide; ++u) shift += apart(u, v);
+  }
+  int cost = 0;
+  for (int v = 0; v < kPatchSide; ++v) {
+    for (int u = 0; u < kPatchSide; ++u) cost += std::abs(apart(u, v) * kPatchArea - shift);
+  }
+  return cost / kPatchArea;
+}
+
+}  // namespace
+}  // namespace stereotrack
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace stereotrack {
 namespace HWY_NAMESPACE {
@@ -76,10 +101,13 @@ hn::Vec<D> nine(D d, const std::uint16_t* sums) {
 }
 
 // The costs of as many places as D has lanes: sums of the picture's pixels under each, and the picture's row v under
-// the patches from column u on. Differences of 16 bits: 2 kBias < 2^16.
+// the patches from column u on. Differences of 16 bits: 2 kBias < 2^16. Where a few of the patch's rows tell that none
+// costs less than `most` they get INT32_MAX.
 template <class D, class Row>
-void costs_from(D d, const Shape& shape, hn::Vec<D> sum, Row&& row, std::int32_t* costs) {
+void costs_from(D d, const Shape& shape, hn::Vec<D> sum, Row&& row, std::int32_t most, std::int32_t* costs) {
+  constexpr int kFewRows = 3;
   const hn::RepartitionToWide<D> sums;
+  const auto limit = hn::Set(sums, static_cast<std::uint32_t>(most) * kPatchArea);
   const auto shift = hn::Sub(hn::Set(d, static_cast<std::uint16_t>(shape.sum + kBias)), sum);
   auto even = hn::Zero(sums);
   auto odd = hn::Zero(sums);
@@ -90,6 +118,12 @@ void costs_from(D d, const Shape& shape, hn::Vec<D> sum, Row&& row, std::int32_t
       const auto pairs = hn::BitCast(sums, apart);
       even = hn::Add(even, hn::And(pairs, hn::Set(sums, 0xFFFFU)));
       odd = hn::Add(odd, hn::ShiftRight<16>(pairs));
+    }
+    if (v % kFewRows != kFewRows - 1) continue;
+    const auto least = hn::Min(even, odd);
+    if (hn::AllTrue(sums, hn::Eq(hn::Max(least, limit), least))) {
+      std::fill_n(costs, hn::Lanes(d), INT32_MAX);
+      return;
     }
   }
   alignas(64) std::uint32_t even_sums[kMostLanes / 2];
@@ -107,14 +141,14 @@ constexpr int kHalf = kMostLanes / 2;
 // The costs of kHalf places under the sums `upper`, and of as many in the row below, where a vector holds both.
 template <class D>
 void two_rows_from(D d, const Shape& shape, const std::uint16_t* upper, const std::uint16_t* lower,
-                   const std::uint16_t* const* under, std::int32_t* costs) {
+                   const std::uint16_t* const* under, std::int32_t most, std::int32_t* costs) {
   if constexpr (hn::MaxLanes(D()) == kMostLanes) {
     const hn::Half<D> half;
     costs_from(
         d, shape, hn::Combine(d, nine(half, lower), nine(half, upper)),
         [&](int v, int u)
             HWY_ATTR { return hn::Combine(d, hn::LoadU(half, under[v + 1] + u), hn::LoadU(half, under[v] + u)); },
-        costs);
+        most, costs);
   }
 }
 
@@ -136,11 +170,14 @@ PatchPlace best_of(const Patch& patch, ImageView<const std::uint8_t> luma, const
   const Wide wide;
   const Narrow narrow;
   std::int32_t costs[2 * (kMostPlaces + kMostLanes)];
+  // The middle, where the patch is expected, mostly costs little: what costs more need not be known.
+  std::int32_t most = cost_at(patch, luma, window.left + window.width / 2, window.top + window.height / 2) + 1;
   PatchPlace best{INT32_MAX, 0, 0};
   const auto keep = [&](const std::int32_t* found, int y) {
     for (int i = 0; i < window.width; ++i) {
       if (found[i] < best.cost) best = {found[i], window.left + i, y};
     }
+    most = std::min(most, best.cost);
   };
   for (int k = 0; k < window.height;) {
     const auto row_of = [&](int r) { return rows.scaled[(k + r) % kRows]; };
@@ -154,7 +191,7 @@ PatchPlace best_of(const Patch& patch, ImageView<const std::uint8_t> luma, const
     const bool more = k + 1 < window.height;
     if (hn::MaxLanes(wide) == kMostLanes && window.width <= kHalf && more) {
       go_down(rows.sums[0], rows.sums[1]);
-      two_rows_from(wide, shape, rows.sums[0], rows.sums[1], under, costs);
+      two_rows_from(wide, shape, rows.sums[0], rows.sums[1], under, most, costs);
       keep(costs, window.top + k);
       keep(costs + kHalf, window.top + k + 1);
       ++k;
@@ -166,7 +203,7 @@ PatchPlace best_of(const Patch& patch, ImageView<const std::uint8_t> luma, const
       const auto at = [&](auto d) HWY_ATTR {
         costs_from(
             d, shape, nine(d, rows.sums[0] + i), [&](int v, int u) HWY_ATTR { return hn::LoadU(d, under[v] + i + u); },
-            costs + i);
+            most, costs + i);
         return static_cast<int>(hn::Lanes(d));
       };
       i += window.width - i > kHalf ? at(wide) : at(narrow);
@@ -247,18 +284,8 @@ PatchPlace best_place_reference(const Patch& patch, ImageView<const std::uint8_t
   PatchPlace best{INT32_MAX, 0, 0};
   for (int y = window.top; y < window.bottom(); ++y) {
     for (int x = window.left; x < window.right(); ++x) {
-      const auto apart = [&](int u, int v) {
-        return patch[static_cast<std::size_t>(v * kPatchSide + u)] - luma.at(x + u - kPatchReach, y + v - kPatchReach);
-      };
-      int shift = 0;
-      for (int v = 0; v < kPatchSide; ++v) {
-        for (int u = 0; u < kPatchSide; ++u) shift += apart(u, v);
-      }
-      int cost = 0;
-      for (int v = 0; v < kPatchSide; ++v) {
-        for (int u = 0; u < kPatchSide; ++u) cost += std::abs(apart(u, v) * kPatchArea - shift);
-      }
-      if (cost / kPatchArea < best.cost) best = {cost / kPatchArea, x, y};
+      const int cost = cost_at(patch, luma, x, y);
+      if (cost < best.cost) best = {cost, x, y};
     }
   }
   return best;

@@ -20,7 +20,8 @@ using Patch = std::array<std::uint8_t, kPatchArea>;
 ///     cost = sum |kPatchArea (p - q) - sum (p - q)| / kPatchArea    over pairs of the patch's and the picture's
 ///     pixels,
 /// kPatchArea times the sum of absolute differences, each patch less its mean. All of the patches must lie in the
-/// picture; the window's width and height: 1..kMostPlaces. About 2 ns a place.
+/// picture; the window's width and height: 1..kMostPlaces. About 2 ns a place, less
+/// where the patch fits in the window's middle and the picture has contrast.
 inline constexpr int kMostPlaces = 129;
 struct PatchPlace {
   std::int32_t cost = 0;

@@ -48,6 +48,36 @@ TEST(FeaturesKernel, TheBestPlaceIsTheReferencesForEveryWindow) {
   }
 }
 
+// What fits in the middle is known beforehand, and the rest is left as soon as it is worse; of ties the first counts
+// all the same, before the middle and after it.
+TEST(FeaturesKernel, APatchOfThePictureIsFoundWhereverItStands) {
+  constexpr int kSide = 40;
+  for (const int period : {kSide, 6}) {  // the picture once, or over and over
+    Noise picture(kSide, kSide, 8);
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        picture.pixels[static_cast<std::size_t>(y * kSide + x)] = picture.view.at(x % period, y % period);
+      }
+    }
+    for (const int side : {1, 2, 5, 8, 9, 16, 17}) {
+      const Rect window{kPatchReach + 3, kPatchReach + 5, side, side};
+      for (int y = window.top; y < window.bottom(); ++y) {
+        for (int x = window.left; x < window.right(); ++x) {
+          Patch patch;
+          for (int v = 0; v < kPatchSide; ++v) {
+            std::copy_n(picture.view.row(y + v - kPatchReach) + x - kPatchReach, kPatchSide,
+                        patch.begin() + v * kPatchSide);
+          }
+          const std::vector<int> expected = values_of(best_place_reference(patch, picture.view, window));
+          EXPECT_EQ(expected[0], 0);
+          test::on_each_target(
+              [&] { EXPECT_EQ(values_of(best_place(patch, picture.view, window)), expected) << x << ' ' << y; });
+        }
+      }
+    }
+  }
+}
+
 TEST(FeaturesKernel, TheLargestWindowIsTheReferences) {
   const Noise noise(kMostPlaces + kPatchSide - 1, kMostPlaces + kPatchSide - 1, 5);
   const Noise cut(kPatchSide, kPatchSide, 6);
