@@ -40,6 +40,7 @@ struct CameraConfig {
   CameraDriver driver = CameraDriver::kV4l2;
   CameraDeviceConfig left;
   CameraDeviceConfig right;           ///< empty: one camera, mono
+  bool side_by_side = false;          ///< the left camera's picture holds both views
   int width = 640;                    ///< [px]
   int height = 480;                   ///< [px]
   std::string format = "auto";        ///< a name of the driver's

@@ -72,6 +72,11 @@ std::string cameras_differ(const Configuration& c) {
   return quoted(c.camera.right.device) + " is both cameras: give two devices, or leave the right one out for mono";
 }
 
+std::string one_camera_has_both_views(const Configuration& c) {
+  if (!has_cameras(c) || !c.camera.side_by_side || c.camera.right.device.empty()) return {};
+  return "the left camera has both views, " + quoted(c.camera.right.device) + " would be a third: leave it out";
+}
+
 std::string exposure_fits_into_a_period(const Configuration& c) {
   if (c.camera.exposure_us * c.camera.fps < 1e6) return {};
   return "an exposure takes longer than there is time between two frames: shorten it, or lower camera.fps";
@@ -102,6 +107,7 @@ std::span<const Rule> rules() {
       {"decided_before_it_leaves", {"latency.lead_ms", "latency.output_ms"}, decided_before_it_leaves},
       {"cameras_have_devices", {"camera.left.device"}, cameras_have_devices},
       {"cameras_differ", {"camera.right.device", "camera.left.device"}, cameras_differ},
+      {"one_camera_has_both_views", {"camera.right.device", "camera.side_by_side"}, one_camera_has_both_views},
       {"exposure_fits_into_a_period", {"camera.exposure_us", "camera.fps"}, exposure_fits_into_a_period},
       {"split_stays_split", {"objects.merge_depth", "objects.split_depth"}, split_stays_split},
   };

@@ -66,7 +66,10 @@ std::vector<Key> keys_of(Configuration& c) {
           "controller) and there are several; empty: the one that is connected, or the nearest."),
       key("camera.right.device", c.camera.right.device, nullptr, "The right one; empty: one camera, in mono."),
       key("camera.right.sensor", c.camera.right.sensor, nullptr, "Likewise."),
-      key("camera.width", c.camera.width, 16, 8192, "px", "Width of the pictures of each camera."),
+      key("camera.side_by_side", c.camera.side_by_side,
+          "One device with two eyes: the left camera's picture holds both views, the left one beside the right one."),
+      key("camera.width", c.camera.width, 16, 8192, "px",
+          "Width of the pictures of each camera; of both views with camera.side_by_side."),
       key("camera.height", c.camera.height, 16, 8192, "px", "Height of them."),
       key("camera.format", c.camera.format, nullptr,
           "How pictures lie in memory, such as grey8, yuyv, nv12, rggb10p; auto: grey, else what is cheapest to read."),
@@ -317,7 +320,8 @@ std::vector<Key> keys_of(Configuration& c) {
   add_thread(keys, "publisher", c.realtime.publisher, "lets results leave: the highest, it runs for microseconds");
   add_thread(keys, "capture", c.realtime.capture, "takes frames from the sensors");
   add_thread(keys, "frames", c.realtime.frames, "runs the pipeline");
-  add_thread(keys, "service", c.realtime.service, "logs, serves figures and feeds the watchdog");
+  add_thread(keys, "service", c.realtime.service,
+             "logs, serves figures and feeds the watchdog, and of the one that writes recordings");
   return keys;
 }
 

@@ -17,7 +17,7 @@ struct SideBySide {
 }
 
 /// The two views, in the memory of the whole: one buffer, one lease, one time, nothing is copied. Only of a picture for
-/// which splits_side_by_side(). For whoever makes pairs of one Camera.
+/// which splits_side_by_side().
 [[nodiscard]] constexpr SideBySide split_side_by_side(const Picture& whole) noexcept {
   SideBySide views{whole, whole};
   views.left.width = whole.width / 2;

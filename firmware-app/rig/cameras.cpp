@@ -60,6 +60,7 @@ capture::StereoCameras::Config pairing_config(const config::CameraConfig& camera
   capture::StereoCameras::Config pairing;
   pairing.name = source_name(camera);
   pairing.stereo = !camera.right.device.empty();
+  pairing.side_by_side = camera.side_by_side;
   pairing.tolerance = camera.tolerance;
   pairing.triggered = camera.triggered;
   pairing.timeout = from_ms(camera.timeout_ms);
@@ -103,7 +104,12 @@ CameraCheck check_cameras(const config::Loaded& loaded) {
       check.failures.emplace_back(error.what());
     }
   }
-  if (first) check.info = capture::source_info(pairing_config(camera), *first);
+  if (!first) return check;
+  const capture::StereoCameras::Config pairing = pairing_config(camera);
+  if (std::string wrong = capture::split_refusal(pairing, *first); !wrong.empty()) {
+    check.failures.push_back(std::move(wrong));
+  }
+  check.info = capture::source_info(pairing, *first);
   return check;
 }
 

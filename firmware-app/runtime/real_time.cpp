@@ -31,7 +31,39 @@ std::string reason(int error) { return std::strerror(error); }
   for (std::size_t i = 0; i < sizeof stack; i += 4096) stack[i] = 0;
 }
 
+// Priority and core.
+std::vector<Missing> set_up(pthread_t thread, const ThreadPlan& plan, RealTimeMode mode) {
+  std::vector<Missing> missing;
+  if (mode == RealTimeMode::kOff) return missing;
+  if (plan.core >= 0) {
+    cpu_set_t cores;
+    CPU_ZERO(&cores);
+    const bool known = plan.core < CPU_SETSIZE;
+    if (known) CPU_SET(static_cast<unsigned>(plan.core), &cores);
+    const int set = known ? pthread_setaffinity_np(thread, sizeof cores, &cores) : EINVAL;
+    if (set != 0) {
+      missing.push_back({"thread " + plan.name + ": core " + std::to_string(plan.core) + ": " + reason(set),
+                         "a core that this machine has and the unit's CPUAffinity= allows, or -1 for any"});
+    }
+  }
+  if (plan.priority > 0) {
+    sched_param parameters{};
+    parameters.sched_priority = plan.priority;
+    const int set = pthread_setschedparam(thread, SCHED_FIFO, &parameters);
+    if (set != 0) {
+      missing.push_back(
+          {"thread " + plan.name + ": real-time priority " + std::to_string(plan.priority) + ": " + reason(set),
+           "LimitRTPRIO=" + std::to_string(plan.priority) + " in the unit, or `ulimit -r`, or CAP_SYS_NICE"});
+    }
+  }
+  return missing;
+}
+
 }  // namespace
+
+std::vector<Missing> set_up_this_thread(const ThreadPlan& plan, RealTimeMode mode) {
+  return set_up(pthread_self(), plan, mode);
+}
 
 RealTimeProcess::RealTimeProcess(const Config& config) {
   (void)mallopt(M_TRIM_THRESHOLD, -1);
@@ -64,40 +96,15 @@ Thread::Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> 
   const int made = pthread_create(&thread_, &attributes, &Thread::run, this);
   (void)pthread_attr_destroy(&attributes);
   if (made != 0) throw std::runtime_error("thread " + plan.name + ": " + reason(made));
-  set_up();
+  // From outside, while the thread waits: who starts it must know what is missing before it goes on.
+  (void)pthread_setname_np(thread_, plan_.name.c_str());
+  missing_ = set_up(thread_, plan_, mode_);
 }
 
 void Thread::begin() noexcept {
   if (begun_ || joined_) return;
   begun_ = true;
   decided_.release();
-}
-
-// From outside, while the thread waits: who starts it must know what is missing before it goes on.
-void Thread::set_up() {
-  (void)pthread_setname_np(thread_, plan_.name.c_str());
-  if (mode_ == RealTimeMode::kOff) return;
-  if (plan_.core >= 0) {
-    cpu_set_t cores;
-    CPU_ZERO(&cores);
-    const bool known = plan_.core < CPU_SETSIZE;
-    if (known) CPU_SET(static_cast<unsigned>(plan_.core), &cores);
-    const int set = known ? pthread_setaffinity_np(thread_, sizeof cores, &cores) : EINVAL;
-    if (set != 0) {
-      missing_.push_back({"thread " + plan_.name + ": core " + std::to_string(plan_.core) + ": " + reason(set),
-                          "a core that this machine has and the unit's CPUAffinity= allows, or -1 for any"});
-    }
-  }
-  if (plan_.priority > 0) {
-    sched_param parameters{};
-    parameters.sched_priority = plan_.priority;
-    const int set = pthread_setschedparam(thread_, SCHED_FIFO, &parameters);
-    if (set != 0) {
-      missing_.push_back(
-          {"thread " + plan_.name + ": real-time priority " + std::to_string(plan_.priority) + ": " + reason(set),
-           "LimitRTPRIO=" + std::to_string(plan_.priority) + " in the unit, or `ulimit -r`, or CAP_SYS_NICE"});
-    }
-  }
 }
 
 void Thread::join() noexcept {

@@ -56,6 +56,10 @@ class RealTimeProcess {
   int latency_fd_ = -1;
 };
 
+/// Gives the calling thread the priority and core of its plan; its name stays. What was not granted. Threads that it
+/// starts from then on inherit both.
+[[nodiscard]] std::vector<Missing> set_up_this_thread(const ThreadPlan& plan, RealTimeMode mode);
+
 /// A thread with policy, priority and core from its plan, a stack of known size that is present from the start, and a
 /// timer slack of 1 ns (the ordinary scheduler's timers may otherwise come 50 us late so that several wake together).
 /// Handlers with SA_ONSTACK have a stack of their own.
@@ -83,7 +87,6 @@ class Thread {
   [[nodiscard]] const std::vector<Missing>& missing() const noexcept { return missing_; }
 
  private:
-  void set_up();
   static void* run(void* self) noexcept;
 
   ThreadPlan plan_;

@@ -175,6 +175,9 @@ std::vector<runtime::Missing> Daemon::start(const config::RealTimeConfig& real_t
   threads_.push_back(make("st-frames", real_time.frames, [this] { frames_->run(*pipeline_, stop_capture_); }));
   threads_.push_back(make("st-capture", real_time.capture,
                           [this] { capture(*source_, outlet_, pool_, *vitals_, capture_end_, stop_capture_); }));
+  // The caller is the service thread. Last: threads inherit.
+  const auto of_service = runtime::set_up_this_thread(plan_of("service", real_time.service), mode);
+  missing.insert(missing.end(), of_service.begin(), of_service.end());
   if (mode == runtime::RealTimeMode::kEnforce && !missing.empty()) {
     threads_.clear();
     recorder_.reset();

@@ -53,9 +53,9 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
   ~Daemon();
 
-  /// Begins. What the threads were not granted; with RealTimeMode::kOff nothing is asked for, with kEnforce nothing has
-  /// begun if anything is missing. If anything is, here or before (`missing_before`), the health of all that leaves
-  /// says so.
+  /// Begins; the caller's thread is the service thread from now on. What the threads were not granted; with
+  /// RealTimeMode::kOff nothing is asked for, with kEnforce nothing has begun if anything is missing. If anything is,
+  /// here or before (`missing_before`), the health of all that leaves says so.
   [[nodiscard]] std::vector<runtime::Missing> start(const config::RealTimeConfig& real_time, bool missing_before);
 
   /// Ends the threads; the lines are in their safe states then. Takes up to 0.1 s, or latency.lead_ms. A recording that

@@ -71,10 +71,10 @@ void read_rig_calibration(Rig& rig, bool stereo) {
 
 std::unique_ptr<capture::LiveSource> open_live_cameras(Rig& rig, bool check) {
   const config::CameraConfig& camera = rig.configuration().camera;
-  const bool stereo = !camera.right.device.empty();
+  const bool stereo = camera.side_by_side || !camera.right.device.empty();
   if (stereo && rig.configuration().calibration.file.empty()) {
     throw config::error_at(rig.loaded.origins, "calibration.file",
-                           "not set: two cameras need their calibration; or leave camera.right.device out for mono");
+                           "not set: two views need their calibration; or leave camera.right.device out for mono");
   }
   read_rig_calibration(rig, stereo);
   std::unique_ptr<capture::LiveSource> source;

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "drivers/capture/side_by_side.hpp"
+
 namespace stereotrack::capture {
 
 namespace {
@@ -57,13 +59,19 @@ std::string delivery_text(const CameraInfo& info) {
 SourceInfo source_info(const StereoCameras::Config& config, const CameraInfo& camera) {
   SourceInfo info;
   info.name = config.name;
-  info.width = camera.width;
+  info.width = config.side_by_side ? camera.width / 2 : camera.width;
   info.height = camera.height;
   info.format = camera.format;
-  info.stereo = config.stereo;
+  info.stereo = config.stereo || config.side_by_side;
   info.has_time = true;
   info.period = camera.period;
   return info;
+}
+
+std::string split_refusal(const StereoCameras::Config& config, const CameraInfo& camera) {
+  if (!config.side_by_side || splits_side_by_side(camera.format, camera.width, camera.height)) return {};
+  return camera.name + ": " + delivery_text(camera) +
+         " cannot be split into two views side by side: set camera.width to one whose half the format can have";
 }
 
 std::string difference_of(const CameraInfo& info, const CameraInfo& other) {
@@ -83,7 +91,7 @@ StereoCameras::StereoCameras(Open open, const Config& config, std::unique_ptr<tr
   if (config_.now == nullptr) config_.now = &read_monotonic;
   std::array<std::string, 2> failures;
   for (const Side side : kSides) {
-    if (side == Side::kRight && !config_.stereo) continue;
+    if (side == Side::kRight && !has_two()) continue;
     try {
       eye(side).camera = open_(side);
     } catch (const std::runtime_error& error) {
@@ -99,6 +107,7 @@ StereoCameras::StereoCameras(Open open, const Config& config, std::unique_ptr<tr
     const std::string wrong = difference_of(each.camera->info(), wanted_);
     if (!wrong.empty()) throw std::runtime_error(wrong);
   }
+  if (const std::string wrong = split_refusal(config_, wanted_); !wrong.empty()) throw std::runtime_error(wrong);
   if (wanted_.period.count() <= 0) {
     throw std::runtime_error(wanted_.name + ": does not say how many frames a second it delivers: set camera.fps");
   }
@@ -132,7 +141,7 @@ StereoCameras::StereoCameras(Open open, const Config& config, std::unique_ptr<tr
   }
   for (const Side side : kSides) {
     Eye& each = eye(side);
-    if (side == Side::kRight && !config_.stereo) continue;
+    if (side == Side::kRight && !has_two()) continue;
     each.back_off = config_.back_off_first;
     if (each.camera) continue;
     each.silent.store(true, std::memory_order_relaxed);
@@ -308,9 +317,14 @@ void StereoCameras::put(PairOutlet& outlet, const trigger::Settled& settled, boo
     pair.right = right.camera->picture(settled.right->buffer);
     named.right = settled.right->buffer;
     of_right = right.settings[settled.right->buffer];
+  } else if (config_.side_by_side) {
+    const SideBySide views = split_side_by_side(pair.left);
+    pair.left = views.left;
+    pair.right = views.right;
+    of_right = left.settings[settled.left->buffer];
   } else {
     if (settled.right) give_back(Side::kRight, settled.right->buffer);
-    if (config_.stereo) mono_pairs_.add();
+    if (has_two()) mono_pairs_.add();
   }
   const PairOutlet::Put outcome = outlet.put(pair, left.settings[settled.left->buffer], of_right);
   if (!outcome.waits) {

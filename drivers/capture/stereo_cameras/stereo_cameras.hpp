@@ -58,7 +58,8 @@ class StereoCameras final : public LiveSource {
 
   struct Config {
     std::string name = "cameras";
-    bool stereo = true;  ///< false: the left one alone
+    bool stereo = true;         ///< false: the left one alone
+    bool side_by_side = false;  ///< the left one alone, whose picture holds both views: see side_by_side.hpp
     double tolerance = 0.25;
     bool triggered = false;
     std::chrono::nanoseconds timeout{std::chrono::milliseconds(500)};
@@ -146,6 +147,7 @@ class StereoCameras final : public LiveSource {
 
   [[nodiscard]] Eye& eye(Side side) noexcept { return eyes_[static_cast<std::size_t>(side)]; }
   [[nodiscard]] MonotonicTime now() const noexcept { return config_.now(); }
+  [[nodiscard]] bool has_two() const noexcept { return config_.stereo && !config_.side_by_side; }
 
   // Capture thread.
   void requeue(PairOutlet& outlet) noexcept;
@@ -218,6 +220,8 @@ class StereoCameras final : public LiveSource {
 [[nodiscard]] std::string delivery_text(const CameraInfo& info);
 /// Why the two cannot make pairs, with the way out; empty: they can.
 [[nodiscard]] std::string difference_of(const CameraInfo& info, const CameraInfo& other);
+/// Why its picture cannot be split, with the way out; empty: it can, or is not to be.
+[[nodiscard]] std::string split_refusal(const StereoCameras::Config& config, const CameraInfo& camera);
 /// What a source of cameras like this one is.
 [[nodiscard]] SourceInfo source_info(const StereoCameras::Config& config, const CameraInfo& camera);
 

@@ -65,6 +65,11 @@ TEST(Rules, CamerasNeedDevicesOfTheirOwn) {
   EXPECT_NE(refused({cameras, left, override_layer("camera.right.device=/dev/video0")}).find("both cameras"),
             std::string::npos);
   EXPECT_EQ(refused({cameras, left, override_layer("camera.right.device=/dev/video2")}), "");
+  EXPECT_NE(refused({cameras, left, override_layer("camera.right.device=/dev/video2"),
+                     override_layer("camera.side_by_side=true")})
+                .find("a third"),
+            std::string::npos);
+  EXPECT_EQ(refused({cameras, left, override_layer("camera.side_by_side=true")}), "");
   // Who watches no cameras may say what he likes of them.
   EXPECT_EQ(refused({left, override_layer("camera.right.device=/dev/video0")}), "");
 }

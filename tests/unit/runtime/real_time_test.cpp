@@ -13,6 +13,7 @@
 #include <fstream>
 #include <functional>
 #include <string>
+#include <thread>
 
 namespace stereotrack::runtime {
 namespace {
@@ -132,6 +133,18 @@ TEST(Thread, CoreThatIsNotThereIsNamed) {
   EXPECT_EQ(words(thread.missing()),
             "thread frames: core 1000: Invalid argument -> a core that this machine has and the unit's CPUAffinity= "
             "allows, or -1 for any\n");
+}
+
+TEST(Thread, TheCallersOwnIsSetUpLikewise) {
+  std::thread([] {
+    EXPECT_EQ(words(set_up_this_thread({.name = "service", .core = 0}, RealTimeMode::kTry)), "");
+    cpu_set_t cores;
+    ASSERT_EQ(pthread_getaffinity_np(pthread_self(), sizeof cores, &cores), 0);
+    EXPECT_EQ(CPU_COUNT(&cores), 1);
+    EXPECT_TRUE(CPU_ISSET(0, &cores));
+    EXPECT_EQ(words(set_up_this_thread({.name = "service", .core = 1000}, RealTimeMode::kOff)), "");
+    EXPECT_NE(words(set_up_this_thread({.name = "service", .core = 1000}, RealTimeMode::kTry)), "");
+  }).join();
 }
 
 TEST(Thread, PriorityThatIsNotGrantedIsNamedAndTheBodyRuns) {

@@ -53,6 +53,49 @@ bool says(const std::vector<SourceNote>& notes, const std::string& cause, const 
                        [&](const SourceNote& note) { return note.cause == cause && note.camera == camera; }) == 1;
 }
 
+TEST(StereoCameras, OneCameraWithBothViewsIsSplitWithinItsBuffer) {
+  StereoCameras::Config wanted = config();
+  wanted.stereo = false;
+  wanted.side_by_side = true;
+  CameraRig rig(wanted);
+  rig.open();
+  EXPECT_TRUE(rig.cameras->info().stereo);
+  EXPECT_EQ(rig.cameras->info().width, 8);
+  EXPECT_FALSE(rig.right.is_open());
+  for (std::uint64_t n = 1; n <= 20; ++n) {
+    rig.advance(kFramePeriod);
+    (void)rig.left.expose({.number = n, .time = kFramePeriod * static_cast<std::int64_t>(n), .sequence = n});
+    rig.step();
+    const PairLease lease = rig.pool.take_oldest();
+    ASSERT_TRUE(lease) << n;
+    EXPECT_EQ(lease->right.data, lease->left.data + 8);
+    EXPECT_EQ(lease->right.stride_bytes, 16);
+    EXPECT_EQ(number_of(lease->left), n);
+    EXPECT_EQ(number_of(lease->right), n);
+    EXPECT_FALSE(lease->skew.has_value());
+  }
+  EXPECT_EQ(rig.cameras->figures().mono_pairs, 0U);
+  EXPECT_EQ(rig.left.given_back_wrongly(), 0);
+}
+
+TEST(StereoCameras, APictureThatCannotBeSplitIsRefusedWithTheWayOut) {
+  StereoCameras::Config wanted = config();
+  wanted.stereo = false;
+  wanted.side_by_side = true;
+  CameraRig rig(wanted);
+  CameraInfo odd = rig.left.info();
+  odd.format = PixelFormat::kYuyv;
+  odd.width = 10;  // a half of 5, whose colours come in twos
+  rig.left.set_info(odd);
+  try {
+    rig.open();
+    FAIL() << "was opened";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("left-device: 10x4 yuyv cannot be split"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(StereoCameras, PairsLeaveFromTheDriversOwnBuffersWithSkewAndSettings) {
   CameraRig rig(config());
   rig.open();

@@ -70,9 +70,11 @@ TEST(Daemon, EnforceBeginsNothingWhereAThreadIsNotGrantedWhatItIsToHave) {
   wanted.mode = config::RealTimeMode::kEnforce;
   for (config::ThreadConfig* thread : {&wanted.publisher, &wanted.capture, &wanted.frames}) *thread = {};
   wanted.capture.core = 1023;
+  wanted.service.core = 1023;
   const std::vector<runtime::Missing> missing = rig.daemon->start(wanted, false);
-  ASSERT_EQ(missing.size(), 1U);
+  ASSERT_EQ(missing.size(), 2U);
   EXPECT_NE(missing[0].what.find("thread st-capture: core 1023: "), std::string::npos) << missing[0].what;
+  EXPECT_NE(missing[1].what.find("thread service: core 1023: "), std::string::npos) << missing[1].what;
   std::this_thread::sleep_for(2 * kPeriod);
   EXPECT_EQ(rig.daemon->vitals().capture_beats.get(), 0U);
   EXPECT_EQ(rig.daemon->pool().captured, 0U);
