@@ -43,8 +43,9 @@ struct SensorFrame {
 /// driver put it until give_back() names its buffer, in any order.
 ///
 /// A factory opens it, sets format and controls and throws std::runtime_error with one line naming the device and the
-/// way out. start() and the destructor belong to the thread that may wait and allocate; what stands below "Capture
-/// thread" to that thread alone, from start() to its end. A camera that is gone never comes back: another is opened.
+/// way out. start(), failure() and the destructor belong to the thread that may wait and allocate; what stands below
+/// "Capture thread" to that thread alone, from start() to its end. A camera that is gone never comes back: another is
+/// opened.
 class Camera {
  public:
   enum class Take : std::uint8_t {
@@ -71,6 +72,10 @@ class Camera {
   /// Queues all buffers and begins to stream. Throws std::runtime_error, one line.
   virtual void start() = 0;
 
+  /// After take() has said kLost, and handed over from the thread that heard it: one line naming the device, the cause
+  /// and the way out. Else empty.
+  [[nodiscard]] virtual std::string failure() const = 0;
+
   // ---- Capture thread; no lock, no heap
 
   /// Readable, for poll(2), when take() will not answer kNothing.
@@ -84,9 +89,6 @@ class Camera {
 
   /// What the buffer of a frame that was taken shows.
   [[nodiscard]] virtual Picture picture(std::uint32_t buffer) const noexcept = 0;
-
-  /// After kLost: one line naming the device, the cause and the way out. Written once, before take() first says kLost.
-  [[nodiscard]] virtual const std::string& failure() const noexcept = 0;
 
   // ---- Any thread
 

@@ -2,39 +2,12 @@
 
 #include <algorithm>
 
+#include "drivers/capture/pixel_format_names.hpp"
 #include "drivers/record/text_lines.hpp"
 
 namespace stereotrack::record {
 
 namespace {
-
-struct Name {
-  PixelFormat format;
-  const char* name;
-};
-constexpr std::array<Name, kPixelFormats> kFormats{{{PixelFormat::kGrey8, "grey8"},
-                                                    {PixelFormat::kBgr8, "bgr8"},
-                                                    {PixelFormat::kYuyv, "yuyv"},
-                                                    {PixelFormat::kUyvy, "uyvy"},
-                                                    {PixelFormat::kNv12, "nv12"},
-                                                    {PixelFormat::kGrey10, "grey10"},
-                                                    {PixelFormat::kGrey12, "grey12"},
-                                                    {PixelFormat::kGrey16, "grey16"},
-                                                    {PixelFormat::kGrey10Packed, "grey10p"},
-                                                    {PixelFormat::kGrey12Packed, "grey12p"},
-                                                    {PixelFormat::kRgb8, "rgb8"},
-                                                    {PixelFormat::kBayerRggb8, "rggb8"},
-                                                    {PixelFormat::kBayerGrbg8, "grbg8"},
-                                                    {PixelFormat::kBayerGbrg8, "gbrg8"},
-                                                    {PixelFormat::kBayerBggr8, "bggr8"},
-                                                    {PixelFormat::kBayerRggb10, "rggb10"},
-                                                    {PixelFormat::kBayerGrbg10, "grbg10"},
-                                                    {PixelFormat::kBayerGbrg10, "gbrg10"},
-                                                    {PixelFormat::kBayerBggr10, "bggr10"},
-                                                    {PixelFormat::kBayerRggb10Packed, "rggb10p"},
-                                                    {PixelFormat::kBayerGrbg10Packed, "grbg10p"},
-                                                    {PixelFormat::kBayerGbrg10Packed, "gbrg10p"},
-                                                    {PixelFormat::kBayerBggr10Packed, "bggr10p"}}};
 
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -60,8 +33,7 @@ std::string to_text(const About& about) {
   out.key("program").word(one_line(about.program));
   out.key("cause").word(one_line(about.cause));
   out.key("size").number(about.width).number(about.height);
-  const auto is_it = [&](const Name& name) { return name.format == about.format; };
-  out.key("format").word(std::find_if(kFormats.begin(), kFormats.end(), is_it)->name);
+  out.key("format").word(std::string(capture::name_of(about.format)));
   out.key("views").number(about.stereo ? 2 : 1);
   out.key("period_ns").number(about.period_ns);
   out.key("rig").number(about.rig);
@@ -84,10 +56,9 @@ About about_from_text(const std::string& text, const std::string& name) {
   about.width = size[0];
   about.height = size[1];
   const std::string format = in.word("format");
-  const auto found =
-      std::find_if(kFormats.begin(), kFormats.end(), [&](const Name& known) { return format == known.name; });
-  if (found == kFormats.end()) in.fail("format", "is none that is known: " + format);
-  about.format = found->format;
+  const std::optional<PixelFormat> known = capture::pixel_format_of(format);
+  if (!known.has_value()) in.fail("format", "is none that is known: " + format);
+  about.format = *known;
   about.stereo = in.number<int>("views") == 2;
   about.period_ns = in.number<std::int64_t>("period_ns");
   about.rig = in.number<std::uint32_t>("rig");

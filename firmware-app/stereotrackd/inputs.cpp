@@ -64,7 +64,8 @@ void Inputs::begin(Setup setup, gpio::InputLines lines) {
   care_ = LineCare("GPIO inputs");
 }
 
-void Inputs::exchange(Setup setup) {
+void Inputs::exchange(Setup setup, record::BlackBox* box) {
+  take(box);  // edges that lines of before had until now
   const auto spec_of = [](const Input& input) { return input.spec; };
   const bool same =
       std::equal(setup.inputs.begin(), setup.inputs.end(), setup_.inputs.begin(), setup_.inputs.end(),

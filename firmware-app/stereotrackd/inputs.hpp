@@ -33,8 +33,9 @@ class Inputs {
   explicit Inputs(Setup setup);
 
   /// Goes on with other lines, or the same in another way; counts of lines that stay under their name go on. Throws
-  /// std::runtime_error, one line, where those cannot be had: then all is as it was.
-  void exchange(Setup setup);
+  /// std::runtime_error, one line, where those cannot be had: then all is as it was. `box`: of take(), for edges that
+  /// came until now.
+  void exchange(Setup setup, record::BlackBox* box);
 
   /// Readable when edges wait; -1: there are no lines.
   [[nodiscard]] int descriptor() const noexcept { return lines_.descriptor(); }

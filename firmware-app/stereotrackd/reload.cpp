@@ -16,7 +16,7 @@ namespace {
 /// False: the log was told why not.
 bool take_inputs(const config::Configuration& wanted, Daemon& daemon) {
   try {
-    daemon.inputs().exchange(input_setup(wanted));
+    daemon.inputs().exchange(input_setup(wanted), daemon.black_box());
     return true;
   } catch (const std::runtime_error& error) {
     log(LogLevel::kWarning, std::string("reload: input: cannot change: ") + error.what(),

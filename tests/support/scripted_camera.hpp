@@ -218,7 +218,7 @@ class ScriptedCamera final : public capture::Camera {
     return {script_.pixels_[buffer].data(), info_.width, info_.height,
             static_cast<std::ptrdiff_t>(row_bytes(info_.format, info_.width)), info_.format};
   }
-  [[nodiscard]] const std::string& failure() const noexcept override { return failure_; }
+  [[nodiscard]] std::string failure() const override { return failure_; }
   [[nodiscard]] ClockMap clock_map() const noexcept override {
     return {CaptureTime(), MonotonicTime(std::chrono::nanoseconds(script_.offset_ns_.load()))};
   }

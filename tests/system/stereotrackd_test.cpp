@@ -583,7 +583,8 @@ TEST(Stereotrackd, SighupTakesOverInputsAndRefusesThoseThatCannotBeHad) {
     return ear.messages().size() > 50;
   })) << daemon.err_so_far();
   press(first);
-  ASSERT_TRUE(wait_for([&] { return read_text(figures).find("input_edges_total{") != std::string::npos; }));
+  const std::string before = "{input=\"door\",line=\"sim:" + first.string() + "\"}";
+  ASSERT_TRUE(wait_for([&] { return figure(figures, "input_edges_total" + before) == 1; }));
 
   (void)small(folder.path(), metrics + input_at(folder / "no" / "such" / "folder"));
   ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);

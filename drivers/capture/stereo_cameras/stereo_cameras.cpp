@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "drivers/capture/pixel_format_names.hpp"
 #include "drivers/capture/side_by_side.hpp"
 
 namespace stereotrack::capture {
@@ -33,12 +34,6 @@ timespec to_timespec(std::chrono::nanoseconds span) noexcept {
   return {static_cast<time_t>(whole.count()), static_cast<long>((span - whole).count())};
 }
 
-// As recordings and camera.format name them.
-constexpr std::array<const char*, kPixelFormats> kFormatNames{
-    "grey8",   "bgr8",    "yuyv",   "uyvy",    "nv12",    "grey10",  "grey12", "grey16",
-    "grey10p", "grey12p", "rgb8",   "rggb8",   "grbg8",   "gbrg8",   "bggr8",  "rggb10",
-    "grbg10",  "gbrg10",  "bggr10", "rggb10p", "grbg10p", "gbrg10p", "bggr10p"};
-
 std::string seconds_text(std::chrono::nanoseconds span) {
   char text[32];
   (void)std::snprintf(text, sizeof text, "%.2f s", to_seconds(span));
@@ -52,8 +47,7 @@ void add(Counter& to, std::uint64_t before, std::uint64_t now) noexcept { to.set
 // ---- Main thread
 
 std::string delivery_text(const CameraInfo& info) {
-  return std::to_string(info.width) + 'x' + std::to_string(info.height) + ' ' +
-         kFormatNames.at(static_cast<std::size_t>(info.format));
+  return std::to_string(info.width) + 'x' + std::to_string(info.height) + ' ' + std::string(name_of(info.format));
 }
 
 SourceInfo source_info(const StereoCameras::Config& config, const CameraInfo& camera) {

@@ -15,12 +15,12 @@ namespace {
 constexpr std::uint32_t kY12P = v4l2_fourcc('Y', '1', '2', 'P');
 
 constexpr std::array kKnown = {
-    KnownFormat{"grey", V4L2_PIX_FMT_GREY, PixelFormat::kGrey8},
-    KnownFormat{"y10p", V4L2_PIX_FMT_Y10P, PixelFormat::kGrey10Packed},
-    KnownFormat{"y12p", kY12P, PixelFormat::kGrey12Packed},
-    KnownFormat{"y10", V4L2_PIX_FMT_Y10, PixelFormat::kGrey10},
-    KnownFormat{"y12", V4L2_PIX_FMT_Y12, PixelFormat::kGrey12},
-    KnownFormat{"y16", V4L2_PIX_FMT_Y16, PixelFormat::kGrey16},
+    KnownFormat{"grey8", V4L2_PIX_FMT_GREY, PixelFormat::kGrey8},
+    KnownFormat{"grey10p", V4L2_PIX_FMT_Y10P, PixelFormat::kGrey10Packed},
+    KnownFormat{"grey12p", kY12P, PixelFormat::kGrey12Packed},
+    KnownFormat{"grey10", V4L2_PIX_FMT_Y10, PixelFormat::kGrey10},
+    KnownFormat{"grey12", V4L2_PIX_FMT_Y12, PixelFormat::kGrey12},
+    KnownFormat{"grey16", V4L2_PIX_FMT_Y16, PixelFormat::kGrey16},
     KnownFormat{"nv12", V4L2_PIX_FMT_NV12, PixelFormat::kNv12},
     KnownFormat{"nv12m", V4L2_PIX_FMT_NV12M, PixelFormat::kNv12, 2},
     KnownFormat{"rggb8", V4L2_PIX_FMT_SRGGB8, PixelFormat::kBayerRggb8},
@@ -37,8 +37,8 @@ constexpr std::array kKnown = {
     KnownFormat{"grbg10", V4L2_PIX_FMT_SGRBG10, PixelFormat::kBayerGrbg10},
     KnownFormat{"gbrg10", V4L2_PIX_FMT_SGBRG10, PixelFormat::kBayerGbrg10},
     KnownFormat{"bggr10", V4L2_PIX_FMT_SBGGR10, PixelFormat::kBayerBggr10},
-    KnownFormat{"bgr24", V4L2_PIX_FMT_BGR24, PixelFormat::kBgr8},
-    KnownFormat{"rgb24", V4L2_PIX_FMT_RGB24, PixelFormat::kRgb8},
+    KnownFormat{"bgr8", V4L2_PIX_FMT_BGR24, PixelFormat::kBgr8},
+    KnownFormat{"rgb8", V4L2_PIX_FMT_RGB24, PixelFormat::kRgb8},
 };
 
 }  // namespace

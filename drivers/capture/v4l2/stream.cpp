@@ -2,6 +2,8 @@
 
 #include <linux/videodev2.h>
 
+#include <cerrno>
+#include <string>
 #include <utility>
 
 namespace stereotrack::capture::v4l2 {
@@ -41,8 +43,6 @@ Stream::Stream(Parts parts, std::vector<std::string>& notes)
     pictures_[i] = {buffers_.memory(i).data() + layout.offset(), layout.width, layout.height,
                     static_cast<std::ptrdiff_t>(layout.stride), layout.format->format};
   }
-  // Room for the capture thread to write in.
-  failure_.reserve(parts_.info.name.size() + parts_.info.model.size() + 400);
   watch_events();
 }
 
@@ -82,6 +82,15 @@ void Stream::start() {
   int type = static_cast<int>(parts_.layout.buffer_type());
   if (const int error = parts_.node.ask(VIDIOC_STREAMON, type); error != 0) fail("does not start to stream", error);
   streaming_ = true;
+}
+
+std::string Stream::failure() const {
+  if (!lost_) return {};
+  const bool gone = loss_error_ == ENODEV || loss_error_ == ENXIO || loss_error_ == EINVAL;
+  return "camera " + parts_.info.name + " (" + parts_.info.model + "): " + loss_ + " (" + error_text(loss_error_) +
+         ", errno " + std::to_string(loss_error_) + ") after " +
+         std::to_string(frames_.load(std::memory_order_relaxed)) + " frames: " +
+         (gone ? "check its plug and power, dmesg tells more" : "dmesg tells what its driver found; open it anew");
 }
 
 Camera::Counters Stream::counters() const noexcept {

@@ -94,7 +94,7 @@ class Stream final : public Camera {
   [[nodiscard]] Take take(SensorFrame& frame) noexcept override;
   void give_back(std::uint32_t buffer) noexcept override;
   [[nodiscard]] Picture picture(std::uint32_t buffer) const noexcept override { return pictures_[buffer]; }
-  [[nodiscard]] const std::string& failure() const noexcept override { return failure_; }
+  [[nodiscard]] std::string failure() const override;
 
   [[nodiscard]] ClockMap clock_map() const noexcept override { return {}; }
   [[nodiscard]] Counters counters() const noexcept override;
@@ -125,7 +125,8 @@ class Stream final : public Camera {
   bool watches_sensor_ = false;
   bool streaming_ = false;
   bool lost_ = false;
-  std::string failure_;
+  const char* loss_ = "";  ///< why
+  int loss_error_ = 0;
 
   // One writer, the capture thread.
   std::atomic<std::uint64_t> frames_{0};

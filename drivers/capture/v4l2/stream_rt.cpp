@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <ctime>
 
 #include "drivers/capture/v4l2/stream.hpp"
@@ -78,14 +77,8 @@ bool Stream::follow_events() noexcept {
 }
 
 Camera::Take Stream::lose(const char* cause, int error) noexcept {
-  const bool gone = error == ENODEV || error == ENXIO || error == EINVAL;
-  char text[384];
-  std::snprintf(
-      text, sizeof text, ": %s (%s, errno %d) after %llu frames: %s", cause, error_text(error), error,
-      static_cast<unsigned long long>(frames_.load(std::memory_order_relaxed)),
-      gone ? "check its plug and power, dmesg tells more" : "dmesg tells what its driver found; open it anew");
-  failure_.assign("camera ").append(parts_.info.name);
-  failure_.append(" (").append(parts_.info.model).append(")").append(text);
+  loss_ = cause;
+  loss_error_ = error;
   lost_ = true;
   return Take::kLost;
 }

@@ -282,7 +282,7 @@ TEST(Daemon, AnEdgeOfAnInputIsAReasonToRecordUnlessItComesTooSoon) {
   LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce),
               {"latency.output_ms=30", "record.on=true", "record.seconds=1", "record.seconds_after=0.1",
                "record.on_deadline=false", "record.directory=" + folder.path().string()});
-  rig.daemon->inputs().exchange(button("button"));
+  rig.daemon->inputs().exchange(button("button"), rig.daemon->black_box());
   const auto drive = [](bool high, int s) {
     gpio::simulated_chip::drive("button", high, MonotonicTime(std::chrono::seconds(s)));
   };
@@ -311,7 +311,7 @@ TEST(Daemon, AnEdgeOfAnInputIsAReasonToRecordUnlessItComesTooSoon) {
 
 TEST(Daemon, AnEdgeIsCountedAndNoMoreWhereItIsNoReasonToRecord) {
   LiveRig rig(film_of_scene(1, 30, kPeriod), kLatency);
-  rig.daemon->inputs().exchange(button("button_idle", false));
+  rig.daemon->inputs().exchange(button("button_idle", false), rig.daemon->black_box());
   gpio::simulated_chip::drive("button_idle", true, MonotonicTime(std::chrono::seconds(100)));
   rig.run();
   EXPECT_EQ(rig.daemon->inputs().events(0), 1U);
@@ -320,7 +320,7 @@ TEST(Daemon, AnEdgeIsCountedAndNoMoreWhereItIsNoReasonToRecord) {
 
 TEST(Daemon, AnInputChipThatWentIsToldInTheHealthAndReadAgain) {
   LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce), kLatency);
-  rig.daemon->inputs().exchange(button("usb_button"));
+  rig.daemon->inputs().exchange(button("usb_button"), rig.daemon->black_box());
   int step = 0;
   rig.run([&] {
     if (step == 0 && is_well(rig)) {
@@ -345,19 +345,19 @@ TEST(Inputs, ExchangedTheyKeepTheirCountsAndWhatCannotBeHadChangesNothing) {
   gpio::simulated_chip::drive("swap_a", true, MonotonicTime(std::chrono::seconds(1)));
   inputs.take(nullptr);
   EXPECT_EQ(inputs.events(0), 1U);
-  inputs.exchange(button("swap_b"));
+  inputs.exchange(button("swap_b"), nullptr);
   EXPECT_EQ(inputs.events(0), 1U) << "of the same name";
   gpio::simulated_chip::drive("swap_b", true, MonotonicTime(std::chrono::seconds(2)));
   inputs.take(nullptr);
   EXPECT_EQ(inputs.events(0), 2U);
 
   const Inputs other(button("swap_held"));
-  EXPECT_THROW(inputs.exchange(button("swap_held")), std::runtime_error);
+  EXPECT_THROW(inputs.exchange(button("swap_held"), nullptr), std::runtime_error);
   EXPECT_EQ(to_string(inputs.line(0)), "sim:swap_b");
   gpio::simulated_chip::drive("swap_b", false, MonotonicTime(std::chrono::seconds(3)));
   inputs.take(nullptr);
   EXPECT_EQ(inputs.events(0), 3U);
-  inputs.exchange({});
+  inputs.exchange({}, nullptr);
   EXPECT_EQ(inputs.size(), 0U);
   EXPECT_EQ(inputs.descriptor(), -1);
 }

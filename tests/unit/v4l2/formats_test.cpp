@@ -52,7 +52,7 @@ TEST(Formats, CodesAreReadable) {
 
 TEST(Layout, APictureWithinAFrameBeginsAtItsOffset) {
   Layout layout;
-  layout.format = find_format(std::string_view("y10p"));
+  layout.format = find_format(std::string_view("grey10p"));
   layout.stride = 100;
   layout.left = 8;
   layout.top = 3;

@@ -59,7 +59,7 @@ TEST_F(Media, AutoTakesTheCheapestThatPasses) {
 
 TEST_F(Media, AWayThroughDebayerAndScalerIsConnectedForEitherSensor) {
   for (const char* const sensor : {"Sensor B", "Sensor A", "Sensor B"}) {
-    Settings wanted = vimc(kScaled, "rgb24", 640, 480);
+    Settings wanted = vimc(kScaled, "rgb8", 640, 480);
     wanted.sensor = sensor;
     const auto camera = started(wanted);
     EXPECT_THAT(camera->info().model, HasSubstr(sensor));
@@ -70,7 +70,7 @@ TEST_F(Media, AWayThroughDebayerAndScalerIsConnectedForEitherSensor) {
 
 // The sensor's other, fixed link goes to a debayer, which takes mosaics alone.
 TEST_F(Media, WhatAFixedNeighbourDoesNotTakeIsRefusedAtTheStart) {
-  EXPECT_THAT(refusal([&] { (void)started(vimc(kRaw, "rgb24", 640, 480)); }),
+  EXPECT_THAT(refusal([&] { (void)started(vimc(kRaw, "rgb8", 640, 480)); }),
               AllOf(HasSubstr("its parts do not fit together"), HasSubstr("media-ctl -p")));
 }
 

@@ -65,7 +65,8 @@ TEST_F(VividTest, AllCamerasAreListedWithWhatTheyOffer) {
   for (const auto& format : cameras[0].formats) {
     if (!format.name.empty()) names.emplace_back(format.name);
   }
-  EXPECT_THAT(names, AllOf(Contains("grey"), Contains("yuyv"), Contains("nv12"), Contains("y16"), Contains("rggb8")));
+  EXPECT_THAT(names,
+              AllOf(Contains("grey8"), Contains("yuyv"), Contains("nv12"), Contains("grey16"), Contains("rggb8")));
   const auto& sizes = cameras[0].formats[0].sizes;
   ASSERT_FALSE(sizes.empty());
   EXPECT_EQ(sizes[0].width, 320);
@@ -112,8 +113,8 @@ TEST_F(VividTest, ASizeOrFormatThatIsNotOfferedIsRefusedWithThoseThatAre) {
   EXPECT_THAT(refusal([&] { (void)open(wanted); }),
               AllOf(HasSubstr("333x180 cannot be had"), HasSubstr("320x180"), HasSubstr("1280x720")));
   wanted = settings();
-  wanted.format = "y10p";
-  EXPECT_THAT(refusal([&] { (void)open(wanted); }), AllOf(HasSubstr("has no format y10p"), HasSubstr("grey, ")));
+  wanted.format = "grey10p";
+  EXPECT_THAT(refusal([&] { (void)open(wanted); }), AllOf(HasSubstr("has no format grey10p"), HasSubstr("grey8, ")));
   wanted.format = "mjpeg";
   EXPECT_THAT(refusal([&] { (void)open(wanted); }), AllOf(HasSubstr("no format is called mjpeg"), HasSubstr("yuyv")));
 }

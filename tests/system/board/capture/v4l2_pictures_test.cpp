@@ -79,7 +79,7 @@ class Pictures : public VividTest {
     return keep(camera->picture(frame.buffer));
   }
   static void expect_same_luma(std::initializer_list<const char*> formats) {
-    const std::vector<std::uint8_t> grey = luma(shot("grey", kGreyRamp));
+    const std::vector<std::uint8_t> grey = luma(shot("grey8", kGreyRamp));
     const auto [darkest, brightest] = std::minmax_element(grey.begin(), grey.end());
     ASSERT_GT(*brightest - *darkest, 200) << "no ramp";
     for (const char* const name : formats) {
@@ -132,12 +132,12 @@ class Pictures : public VividTest {
 };
 
 TEST_F(Pictures, GreyIsTheSameInEveryFormatThatHasIt) {
-  expect_same_luma({"y10", "y12", "y16", "nv12", "yuyv", "uyvy"});
+  expect_same_luma({"grey10", "grey12", "grey16", "nv12", "yuyv", "uyvy"});
 }
 
 TEST_F(Pictures, ColoursAreTheSameInRgbBgrAndMosaics) {
-  const Kept rgb = shot("rgb24", kColourSquares);
-  const Kept bgr = shot("bgr24", kColourSquares);
+  const Kept rgb = shot("rgb8", kColourSquares);
+  const Kept bgr = shot("bgr8", kColourSquares);
   ASSERT_EQ(rgb.bytes.size(), 3U * 640 * 480);
   Kept mirrored = bgr;
   for (std::size_t i = 0; i + 2 < mirrored.bytes.size(); i += 3) std::swap(mirrored.bytes[i], mirrored.bytes[i + 2]);
@@ -180,15 +180,15 @@ TEST_F(Pictures, ExportedBuffersShowWhatMappedOnesDo) {
 }
 
 TEST_F(Pictures, TheMultiPlanarInterfaceShowsTheSame) {
-  const Kept grey = shot("grey", kGreyRamp);
+  const Kept grey = shot("grey8", kGreyRamp);
   const Kept nv12 = shot("nv12", kColourSquares);
   load_vivid("multiplanar=2,2");
   SetUp();
-  EXPECT_TRUE(shot("grey", kGreyRamp).bytes == grey.bytes);
+  EXPECT_TRUE(shot("grey8", kGreyRamp).bytes == grey.bytes);
   EXPECT_TRUE(shot("nv12", kColourSquares).bytes == nv12.bytes);
   EXPECT_TRUE(shot("nv12m", kColourSquares).bytes == nv12.bytes);
   EXPECT_TRUE(shot("nv12m", kColourSquares, Memory::kExported).bytes == nv12.bytes);
-  expect_same_luma({"y10", "y12", "y16", "nv12", "nv12m", "yuyv", "uyvy"});
+  expect_same_luma({"grey10", "grey12", "grey16", "nv12", "nv12m", "yuyv", "uyvy"});
   Settings wanted = settings();
   wanted.format = "nv12m";  // 320 x 180 are 14 pages and a bit
   EXPECT_THAT(refusal([&] { (void)open(wanted); }), AllOf(HasSubstr("multiple of 4096"), HasSubstr("or nv12")));
@@ -196,12 +196,12 @@ TEST_F(Pictures, TheMultiPlanarInterfaceShowsTheSame) {
 }
 
 TEST_F(Pictures, BuffersThatTheProcessorCachesAndOfContiguousMemoryShowTheSame) {
-  const Kept grey = shot("grey", kGreyRamp);
+  const Kept grey = shot("grey8", kGreyRamp);
   for (const char* const parameters : {"cache_hints=1,1", "allocators=1,1", "allocators=1,1 cache_hints=1,1"}) {
     load_vivid(parameters);
     SetUp();
-    EXPECT_TRUE(shot("grey", kGreyRamp).bytes == grey.bytes) << parameters;
-    EXPECT_TRUE(shot("grey", kGreyRamp, Memory::kExported).bytes == grey.bytes) << parameters << ", exported";
+    EXPECT_TRUE(shot("grey8", kGreyRamp).bytes == grey.bytes) << parameters;
+    EXPECT_TRUE(shot("grey8", kGreyRamp, Memory::kExported).bytes == grey.bytes) << parameters << ", exported";
   }
   load_vivid("");
 }

@@ -89,7 +89,7 @@ class VividTest : public ::testing::Test {
     wanted.width = 320;
     wanted.height = 180;
     wanted.fps = 50;
-    wanted.format = "grey";
+    wanted.format = "grey8";
     wanted.readout_us = 0;
     return wanted;
   }
