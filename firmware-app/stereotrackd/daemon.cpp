@@ -3,6 +3,7 @@
 #include <bit>
 #include <chrono>
 #include <cstring>
+#include <new>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -227,6 +228,16 @@ bool Daemon::stop() noexcept {
   stop_recorder_.store(true, std::memory_order_relaxed);
   for (const auto& thread : threads_) thread->join();
   threads_.clear();
+  // The publisher could not drive a chip that was gone and may be back: its lines are requested in their safe states.
+  if (lines_.gone() != 0) {
+    try {
+      (void)lines_.reopen();
+      (void)lines_.set_safe(runtime::monotonic_now());
+    } catch (const std::bad_alloc&) {
+      log(LogLevel::kError, "GPIO outputs: no memory to ask for a chip that was gone: its lines stay as they are",
+          {{"STEREOTRACK_CAUSE", "line"}});
+    }
+  }
   return !recorder_ || recorder_->join_for(kRecorderPatience);
 }
 

@@ -58,9 +58,9 @@ class Daemon {
   /// here or before (`missing_before`), the health of all that leaves says so.
   [[nodiscard]] std::vector<runtime::Missing> start(const config::RealTimeConfig& real_time, bool missing_before);
 
-  /// Ends the threads; the lines are in their safe states then. Takes up to 0.1 s, or latency.lead_ms. A recording that
-  /// is being written is given up. False: the recorder hangs in a write to its disk and still runs: the destructor
-  /// would wait for it.
+  /// Ends the threads; the lines are in their safe states then, a chip that is gone aside. Takes up to 0.1 s, or
+  /// latency.lead_ms. A recording that is being written is given up. False: the recorder hangs in a write to its disk
+  /// and still runs: the destructor would wait for it.
   bool stop() noexcept;
 
   /// The source has ended or failed, and all that it gave has left.

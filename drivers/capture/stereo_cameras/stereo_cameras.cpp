@@ -363,6 +363,11 @@ void StereoCameras::arrived(PairOutlet& outlet, Side side, const SensorFrame& fr
   each.settings[frame.buffer] = frame.settings;
   const CaptureTime time(each.camera->clock_map().to_monotonic(frame.mid_exposure).time_since_epoch());
   each.last = time;
+  if (const std::chrono::nanoseconds ahead = time.time_since_epoch() - at.time_since_epoch();
+      ahead.count() > 0 && !each.ahead_is_told) {
+    each.ahead_is_told = true;
+    tell(Change::kAhead, side, ahead);
+  }
   if (side == Side::kRight && partner.heard && !is_out(Side::kLeft))
     (void)distances_.push({time, time - partner.last, false});
 
@@ -507,6 +512,14 @@ void StereoCameras::say(const Event& event, std::vector<SourceNote>& notes) {
                        std::string(name_of(event.side)) + " camera: is back and delivers frames"});
       break;
     }
+    case Change::kAhead:
+      notes.push_back(
+          {Weight::kWarning, "camera_ahead", name_of(event.side),
+           std::string(name_of(event.side)) + " camera: its frames bear times " +
+               std::to_string(event.span.count() / 1000) +
+               " us after they came, no result of theirs leaves on time: raise camera.readout_us by so much "
+               "at least"});
+      break;
     case Change::kBothSilent:
       notes.push_back({Weight::kWarning, "cameras_silent", "",
                        "cameras: no frame for " + seconds_text(event.span) + ": is the trigger alive?"});

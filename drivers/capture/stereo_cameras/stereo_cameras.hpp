@@ -43,6 +43,7 @@ namespace stereotrack::capture {
 /// * with a trigger::Trigger, frames are counted against its pulses, and the number of a frame's pulse is what two must
 ///   have in common: a missed or doubled exposure breaks no pair. Frames that no pulse asked for are given back. While
 ///   no pulse is told and frames come, they pair without;
+/// * a frame that bears a time after its arrival: told once a camera; what it makes cannot leave on time;
 /// * a camera that comes back and delivers another size or format is refused.
 ///
 /// A lost camera is found within 0.1 s; pairs come again with the third frame of the one that is back, where sequences
@@ -88,7 +89,16 @@ class StereoCameras final : public LiveSource {
   using Side = trigger::Side;
 
   /// What the capture thread tells the service thread; small, so that it is told without memory.
-  enum class Change : std::uint8_t { kHeard, kBothSilent, kBothHeard, kUnmatched, kMatched, kNoPulses, kPulses };
+  enum class Change : std::uint8_t {
+    kHeard,
+    kAhead,
+    kBothSilent,
+    kBothHeard,
+    kUnmatched,
+    kMatched,
+    kNoPulses,
+    kPulses
+  };
   struct Event {
     Change change{};
     Side side{};
@@ -105,6 +115,7 @@ class StereoCameras final : public LiveSource {
     std::unique_ptr<Camera> camera;  ///< null: the service thread has it, or there is none
     bool ending = false;             ///< given up; its buffers are still named
     bool late_comer = false;         ///< not of those that it began with
+    bool ahead_is_told = false;      ///< that its frames bear times at which they had come already
     std::size_t held = 0;            ///< buffers that were taken
     std::size_t buffers = 0;
     MonotonicTime joined{};

@@ -78,6 +78,22 @@ TEST(StereoCameras, OneCameraWithBothViewsIsSplitWithinItsBuffer) {
   EXPECT_EQ(rig.left.given_back_wrongly(), 0);
 }
 
+TEST(StereoCameras, FramesFromTheFutureAreToldOnceWithTheWayOut) {
+  CameraRig rig(config());
+  rig.open();
+  std::vector<SourceNote> notes;
+  (void)play(rig, 1, 3, Who::kBoth, &notes);
+  EXPECT_FALSE(says(notes, "camera_ahead", "left"));
+  // The simulated clock began at 1 s: frame 60 is of 2.4 s, some 1.2 s ahead.
+  (void)play(rig, 60, 63, Who::kBoth, &notes);
+  EXPECT_TRUE(says(notes, "camera_ahead", "left"));
+  EXPECT_TRUE(says(notes, "camera_ahead", "right"));
+  for (const SourceNote& note : notes) {
+    if (std::string(note.cause) != "camera_ahead") continue;
+    EXPECT_NE(note.text.find("raise camera.readout_us"), std::string::npos) << note.text;
+  }
+}
+
 TEST(StereoCameras, APictureThatCannotBeSplitIsRefusedWithTheWayOut) {
   StereoCameras::Config wanted = config();
   wanted.stereo = false;

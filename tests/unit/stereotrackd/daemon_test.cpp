@@ -256,6 +256,23 @@ TEST(Daemon, AnOutputChipThatWentIsDrivenAgainWithoutARestart) {
   EXPECT_EQ(gpio::simulated_chip::level("usb_heart"), false) << "safe at the end, on the new request";
 }
 
+TEST(Daemon, AChipThatIsBackOnlyAtTheEndIsMadeSafeThen) {
+  LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce), kLatency, {},
+              {{.name = {"sim", "late_heart"}}}, {signal(signals::Condition::kHeartbeat)});
+  bool went = false;
+  rig.run([&] {
+    if (!went && gpio::simulated_chip::level("late_heart") == true) {
+      gpio::simulated_chip::set_gone("late_heart", went = true);
+    }
+    if (!went || rig.daemon->lines().gone() == 0) return is_long(rig);
+    gpio::simulated_chip::set_gone("late_heart", false);
+    return true;
+  });
+  EXPECT_TRUE(went);
+  EXPECT_EQ(rig.daemon->lines().outages(), 1U);
+  EXPECT_EQ(gpio::simulated_chip::level("late_heart"), false);
+}
+
 TEST(Daemon, AnOutputChipThatWentIsNoticedThoughNothingChanges) {
   LiveRig rig(film_of_scene(1, 100, kPeriod, capture::Film::Repeat::kBounce), kLatency, {},
               {{.name = {"sim", "usb_quiet"}}}, {signal(signals::Condition::kTimeToReachBelow)});

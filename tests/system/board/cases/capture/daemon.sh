@@ -17,6 +17,8 @@ format = "grey8"
 fps = 10.0
 tolerance = 0.5
 timeout_ms = 1000
+# vivid stamps what it calls the end of a frame, nine tenths of a period after the frame has come.
+readout_us = 90000
 [calibration]
 file = "/run/scene/calibration.yml"
 [latency]
