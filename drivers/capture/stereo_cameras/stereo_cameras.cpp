@@ -364,7 +364,7 @@ void StereoCameras::arrived(PairOutlet& outlet, Side side, const SensorFrame& fr
   const CaptureTime time(each.camera->clock_map().to_monotonic(frame.mid_exposure).time_since_epoch());
   each.last = time;
   if (const std::chrono::nanoseconds ahead = time.time_since_epoch() - at.time_since_epoch();
-      ahead.count() > 0 && !each.ahead_is_told) {
+      side == Side::kLeft && ahead.count() > 0 && !each.ahead_is_told) {
     each.ahead_is_told = true;
     tell(Change::kAhead, side, ahead);
   }

@@ -43,7 +43,7 @@ namespace stereotrack::capture {
 /// * with a trigger::Trigger, frames are counted against its pulses, and the number of a frame's pulse is what two must
 ///   have in common: a missed or doubled exposure breaks no pair. Frames that no pulse asked for are given back. While
 ///   no pulse is told and frames come, they pair without;
-/// * a frame that bears a time after its arrival: told once a camera; what it makes cannot leave on time;
+/// * a left frame, whose time is its pair's, bears one after its arrival: told once a camera; no result leaves on time;
 /// * a camera that comes back and delivers another size or format is refused.
 ///
 /// A lost camera is found within 0.1 s; pairs come again with the third frame of the one that is back, where sequences
@@ -115,7 +115,7 @@ class StereoCameras final : public LiveSource {
     std::unique_ptr<Camera> camera;  ///< null: the service thread has it, or there is none
     bool ending = false;             ///< given up; its buffers are still named
     bool late_comer = false;         ///< not of those that it began with
-    bool ahead_is_told = false;      ///< that its frames bear times at which they had come already
+    bool ahead_is_told = false;      ///< that its frames bear times after their arrival
     std::size_t held = 0;            ///< buffers that were taken
     std::size_t buffers = 0;
     MonotonicTime joined{};
