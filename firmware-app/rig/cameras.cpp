@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/error.hpp"
+#include "config/milliseconds.hpp"
 
 namespace stereotrack {
 
@@ -15,10 +16,6 @@ using trigger::Side;
 
 std::string source_name(const config::CameraConfig& camera) {
   return camera.left.device + (camera.right.device.empty() ? "" : ", " + camera.right.device);
-}
-
-std::chrono::nanoseconds from_ms(double ms) {
-  return std::chrono::nanoseconds(static_cast<std::int64_t>(ms * 1e6 + 0.5));
 }
 
 void check_format(const config::Loaded& loaded) {
@@ -63,7 +60,7 @@ capture::StereoCameras::Config pairing_config(const config::CameraConfig& camera
   pairing.side_by_side = camera.side_by_side;
   pairing.tolerance = camera.tolerance;
   pairing.triggered = camera.triggered;
-  pairing.timeout = from_ms(camera.timeout_ms);
+  pairing.timeout = config::from_ms(camera.timeout_ms);
   return pairing;
 }
 

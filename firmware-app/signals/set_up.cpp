@@ -1,11 +1,11 @@
 #include "firmware-app/signals/set_up.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 
 #include "config/error.hpp"
+#include "config/milliseconds.hpp"
 #include "config/signals.hpp"
 
 namespace stereotrack::signals {
@@ -15,8 +15,6 @@ static_assert(config::kMaxSignals == kMaxSignals && config::kMaxZones == kMaxZon
               config::kMaxCorners == Zone::kMaxCorners);
 
 constexpr double kAnywhere_m = 1e6;
-
-[[nodiscard]] std::chrono::nanoseconds from_ms(double ms) { return std::chrono::nanoseconds(std::llround(ms * 1e6)); }
 
 [[nodiscard]] Zone::Range range_of(const std::array<double, 2>& said) {
   const bool anywhere = said[0] == 0 && said[1] == 0;
@@ -57,9 +55,9 @@ constexpr double kAnywhere_m = 1e6;
   signal.limit_m = said.limit_m;
   signal.limit_s = said.limit_s;
   signal.mode = said.mode == config::SignalMode::kPulse ? Signal::Mode::kPulse : Signal::Mode::kLevel;
-  signal.pulse = from_ms(said.pulse_ms);
-  signal.hold = from_ms(said.hold_ms);
-  signal.half_period = from_ms(said.period_ms) / 2;
+  signal.pulse = config::from_ms(said.pulse_ms);
+  signal.hold = config::from_ms(said.hold_ms);
+  signal.half_period = config::from_ms(said.period_ms) / 2;
   signal.safe = said.safe == config::SafeState::kActive;
   return signal;
 }

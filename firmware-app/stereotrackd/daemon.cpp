@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "config/error.hpp"
+#include "config/milliseconds.hpp"
 #include "config/schema.hpp"
 #include "firmware-app/rig/rig.hpp"
 #include "firmware-app/runtime/clock.hpp"
@@ -20,10 +21,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kRecorderPatience{500};
 constexpr std::chrono::milliseconds kRecorderRound{20};
-
-std::chrono::nanoseconds from_ms(double ms) {
-  return std::chrono::nanoseconds(static_cast<std::int64_t>(ms * 1e6 + 0.5));
-}
 
 runtime::RealTimeMode mode_of(config::RealTimeMode mode) {
   switch (mode) {
@@ -40,12 +37,12 @@ runtime::ThreadPlan plan_of(const char* name, const config::ThreadConfig& config
 
 runtime::OutputSchedule::Config schedule_config(const config::LatencyConfig& latency, std::chrono::nanoseconds period) {
   runtime::OutputSchedule::Config schedule;
-  schedule.latency = from_ms(latency.output_ms);
+  schedule.latency = config::from_ms(latency.output_ms);
   schedule.period = period;
-  schedule.lead = from_ms(latency.lead_ms);
+  schedule.lead = config::from_ms(latency.lead_ms);
   // Under a period by nature: later than that, the next slot is due.
-  schedule.grace = std::min<std::chrono::nanoseconds>(from_ms(latency.grace_ms), period / 2);
-  schedule.oldest_state = from_ms(latency.output_ms + latency.stale_ms);
+  schedule.grace = std::min<std::chrono::nanoseconds>(config::from_ms(latency.grace_ms), period / 2);
+  schedule.oldest_state = config::from_ms(latency.output_ms + latency.stale_ms);
   schedule.missing_limit = latency.missing_limit;
   return schedule;
 }
@@ -57,7 +54,7 @@ record::BlackBox::Config box_config(const config::RecordConfig& record, const co
           .every = record.every,
           .directory = record.directory,
           .max_bytes = static_cast<std::uint64_t>(record.max_mb) << 20U,
-          .patience = 20 + static_cast<int>(from_ms(latency.output_ms) / kRecorderRound)};
+          .patience = 20 + static_cast<int>(config::from_ms(latency.output_ms) / kRecorderRound)};
 }
 
 /// What the publisher may trigger; the others are the main thread's.
@@ -112,11 +109,11 @@ Daemon::Daemon(Parts parts)
     publishing.focal_x_px = parts.calibration->left.fx;
     publishing.focal_y_px = parts.calibration->left.fy;
   }
-  publishing.heart_after = from_ms(configuration.latency.stale_ms);
-  publishing.late_after = from_ms(configuration.latency.late_ms);
-  publishing.awake = from_ms(configuration.latency.awake_ms);
+  publishing.heart_after = config::from_ms(configuration.latency.stale_ms);
+  publishing.late_after = config::from_ms(configuration.latency.late_ms);
+  publishing.awake = config::from_ms(configuration.latency.awake_ms);
   publishing.pool_slots = parts.pool_slots;
-  publishing.skew_limit = from_ms(configuration.camera.skew_limit_ms);
+  publishing.skew_limit = config::from_ms(configuration.camera.skew_limit_ms);
   publishing.exposure_limit = configuration.camera.exposure_limit_percent / 100;
   auto publisher = Publisher::create(publishing, std::move(parts.plan), lines_, pool_, notices_, *mailbox_, bell_,
                                      *source_, *vitals_);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "config/error.hpp"
+#include "config/milliseconds.hpp"
 
 namespace stereotrack::daemon {
 
@@ -143,7 +144,7 @@ Inputs::Setup input_setup(const config::Configuration& configuration) {
                     .bias = bias_of(said.bias),
                     .edges = edges_of(said.edge),
                     .debounce = std::chrono::microseconds(std::llround(said.debounce_ms * 1e3))};
-      input.apart = std::chrono::nanoseconds(std::llround(said.apart_ms * 1e6));
+      input.apart = config::from_ms(said.apart_ms);
       gpio::check_inputs({&input.spec, 1});
       setup.inputs.push_back(std::move(input));
     } catch (const std::runtime_error& error) {

@@ -88,17 +88,16 @@ std::string Stream::failure() const {
   if (!lost_) return {};
   const bool gone = loss_error_ == ENODEV || loss_error_ == ENXIO || loss_error_ == EINVAL;
   return "camera " + parts_.info.name + " (" + parts_.info.model + "): " + loss_ + " (" + error_text(loss_error_) +
-         ", errno " + std::to_string(loss_error_) + ") after " +
-         std::to_string(frames_.load(std::memory_order_relaxed)) + " frames: " +
+         ", errno " + std::to_string(loss_error_) + ") after " + std::to_string(frames_.get()) + " frames: " +
          (gone ? "check its plug and power, dmesg tells more" : "dmesg tells what its driver found; open it anew");
 }
 
 Camera::Counters Stream::counters() const noexcept {
   Counters counters;
-  counters.frames = frames_.load(std::memory_order_relaxed);
-  counters.damaged = damaged_.load(std::memory_order_relaxed);
-  counters.lost = lost_frames_.load(std::memory_order_relaxed);
-  counters.steps = steps_.load(std::memory_order_relaxed);
+  counters.frames = frames_.get();
+  counters.damaged = damaged_.get();
+  counters.lost = lost_frames_.get();
+  counters.steps = steps_.get();
   return counters;
 }
 

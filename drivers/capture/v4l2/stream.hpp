@@ -3,7 +3,6 @@
 #include <linux/videodev2.h>
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -16,6 +15,7 @@
 #include "drivers/capture/v4l2/layout.hpp"
 #include "drivers/capture/v4l2/settings_in_force.hpp"
 #include "drivers/capture/v4l2/stamps.hpp"
+#include "pipeline/core/counter.hpp"
 
 namespace stereotrack::capture::v4l2 {
 
@@ -129,10 +129,10 @@ class Stream final : public Camera {
   int loss_error_ = 0;
 
   // One writer, the capture thread.
-  std::atomic<std::uint64_t> frames_{0};
-  std::atomic<std::uint64_t> damaged_{0};
-  std::atomic<std::uint64_t> lost_frames_{0};
-  std::atomic<std::uint64_t> steps_{0};
+  Counter frames_;
+  Counter damaged_;
+  Counter lost_frames_;
+  Counter steps_;
 };
 
 }  // namespace stereotrack::capture::v4l2

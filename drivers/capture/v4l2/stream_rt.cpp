@@ -25,11 +25,6 @@ nanoseconds stamp_of(const timeval& time) noexcept {
   return nanoseconds(static_cast<std::int64_t>(count));
 }
 
-// One writer: no read-modify-write needed.
-void add(std::atomic<std::uint64_t>& counter, std::uint64_t more) noexcept {
-  counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
-}
-
 }  // namespace
 
 int Stream::queue(std::uint32_t index) noexcept {
@@ -135,10 +130,10 @@ Camera::Take Stream::take(SensorFrame& frame) noexcept {
 
   frame.damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || !place_picture(buffer);
 
-  add(frames_, 1);
-  add(damaged_, frame.damaged ? 1 : 0);
-  add(lost_frames_, counted.lost);
-  add(steps_, stamp.step ? 1 : 0);
+  frames_.add();
+  damaged_.add(frame.damaged ? 1 : 0);
+  lost_frames_.add(counted.lost);
+  steps_.add(stamp.step ? 1 : 0);
   return Take::kFrame;
 }
 
