@@ -26,12 +26,8 @@ std::string reason(int error) { return std::strerror(error); }
 // Writes to each page of the stack below the caller, so that none faults later. Locked memory would be present anyhow;
 // without the right to lock it this is what can be done.
 [[gnu::noinline]] void touch_stack() noexcept {
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-  constexpr std::size_t kLeft = Thread::kStackBytes / 2;  // a sanitizer keeps its own state of the thread there, too
-#else
   constexpr std::size_t kLeft = 64 * 1024;  // for what is on the stack already, and the guard page
-#endif
-  volatile char stack[Thread::kStackBytes - kLeft];
+  volatile char stack[Thread::kUsableStackBytes - kLeft];
   for (std::size_t i = 0; i < sizeof stack; i += 4096) stack[i] = 0;
 }
 

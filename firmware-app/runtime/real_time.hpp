@@ -67,8 +67,14 @@ class RealTimeProcess {
 /// threads before any of them begins. Making one never fails for want of a right: begin() lets it run without it.
 class Thread {
  public:
+  /// Locked and prefaulted: a gigabyte of default stacks is not.
+  static constexpr std::size_t kUsableStackBytes = 512 * 1024;
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
   static constexpr std::size_t kStackBytes =
-      512 * 1024;  ///< locked and prefaulted: a gigabyte of default stacks is not
+      kUsableStackBytes + 4 * 1024 * 1024;  ///< sanitizers keep theirs there, too
+#else
+  static constexpr std::size_t kStackBytes = kUsableStackBytes;
+#endif
 
   /// Throws std::runtime_error where the system has no thread to give.
   Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> body);

@@ -160,7 +160,14 @@ TEST(Thread, PriorityThatIsNotGrantedIsNamedAndTheBodyRuns) {
             "-r`, or CAP_SYS_NICE\nran");
 }
 
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr bool kMemoryCanBeLocked = false;
+#else
+constexpr bool kMemoryCanBeLocked = true;
+#endif
+
 TEST(RealTimeProcess, WhatIsNotGrantedIsNamedWithTheWayOut) {
+  if (!kMemoryCanBeLocked) GTEST_SKIP() << "a sanitizer's mlockall does nothing and says so to nobody";
   const std::string said = as_nobody([] {
     const RealTimeProcess process({});
     return words(process.missing());
@@ -180,6 +187,7 @@ TEST(RealTimeProcess, DeepSleepAsksNothingOfTheCores) {
 
 // In a child, so that the other tests' memory stays as it is.
 TEST(RealTimeProcess, LocksAllMemoryWhereItMay) {
+  if (!kMemoryCanBeLocked) GTEST_SKIP() << "a sanitizer's mlockall does nothing and says so to nobody";
   const auto locked_kb = [] {
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);) {
