@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "firmware-app/runtime/large_pages.hpp"
 #include "firmware-app/stereotrack/output_file.hpp"
 #include "pipeline/core/arena.hpp"
 #include "pipeline/stereo/census_matcher.hpp"
@@ -53,7 +54,7 @@ ImageView<const std::uint8_t> view(const cv::Mat& m) {
 template <class Matcher>
 DisparityCounts match(const typename Matcher::Config& config, const cv::Mat& left, const cv::Mat& right,
                       cv::Mat& disparity) {
-  Arena arena;
+  Arena arena{runtime::advise_large_pages};
   Result<Matcher> matcher = Matcher::create(config, arena);
   if (!matcher.has_value()) {
     throw std::runtime_error("disparity: " + std::string(to_string(matcher.error())) + " for pictures of " +

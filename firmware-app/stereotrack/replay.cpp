@@ -20,6 +20,7 @@
 #include "drivers/telemetry/udp_sender.hpp"
 #include "firmware-app/render/renderer.hpp"
 #include "firmware-app/runtime/allocation_count.hpp"
+#include "firmware-app/runtime/large_pages.hpp"
 #include "firmware-app/runtime/output_schedule.hpp"
 #include "firmware-app/stereotrack/interrupt.hpp"
 #include "firmware-app/stereotrack/output_file.hpp"
@@ -306,7 +307,7 @@ class Replay {
   std::ostream& messages_;
   Rig rig_;
   StageTimes times_;
-  Arena arena_;
+  Arena arena_{runtime::advise_large_pages};
   Pipeline pipeline_;
   telemetry::Encoder encoder_;
   std::array<std::byte, telemetry::kMaxMessageBytes> buffer_{};

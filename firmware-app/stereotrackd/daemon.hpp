@@ -11,6 +11,7 @@
 #include "drivers/gpio/line.hpp"
 #include "drivers/record/black_box.hpp"
 #include "drivers/telemetry/authentication.hpp"
+#include "firmware-app/runtime/large_pages.hpp"
 #include "firmware-app/runtime/real_time.hpp"
 #include "firmware-app/stereotrackd/capture_rt.hpp"
 #include "firmware-app/stereotrackd/frames_rt.hpp"
@@ -118,7 +119,7 @@ class Daemon {
   capture::Doorbell bell_;
   capture::PairOutlet outlet_;
   std::unique_ptr<OutcomeMailbox> mailbox_;
-  Arena arena_;
+  Arena arena_{runtime::advise_large_pages};
   std::unique_ptr<FrameLoop> frames_;
   std::unique_ptr<Pipeline> pipeline_;
   std::unique_ptr<Publisher> publisher_;

@@ -11,30 +11,31 @@
 
 namespace stereotrack {
 
-/// All memory of the stages, taken at start and given back together at the end.
+/// All memory of the stages, taken at start and given back together at the end: neighbours in a few slabs that begin on
+/// a large page.
 /// Set-up only, one thread. After seal() nothing more is handed out: a stage that asks in the frame
 /// loop gets nothing and failed() becomes true, which tests look at.
 class Arena {
  public:
   static constexpr std::size_t kAlignment = 64;  ///< a cache line, and the widest vector register
+  /// Slabs are so large, and multiples of it for requests that are larger: two large pages.
+  static constexpr std::size_t kSlabBytes = std::size_t{4} * 1024 * 1024;
 
-  Arena() noexcept = default;
+  /// Told of each slab before it is written to: where a system can be asked for large pages, of which planes that are
+  /// walked side by side need few (`firmware-app/runtime/large_pages.hpp`).
+  using Advice = void (*)(void* slab, std::size_t bytes) noexcept;
+
+  explicit Arena(Advice advice = nullptr) noexcept : advice_(advice) {}
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
-  ~Arena() {
-    while (blocks_ != nullptr) {
-      Block* next = blocks_->next;
-      ::operator delete (blocks_, std::align_val_t{kAlignment});
-      blocks_ = next;
-    }
-  }
+  ~Arena();
 
   /// `count` value-initialised (zeroed) elements, aligned to kAlignment; empty, and failed() from then on, if there is
   /// no memory or the arena is sealed.
   template <class T>
   [[nodiscard]] std::span<T> array(std::size_t count) noexcept {
     static_assert(std::is_default_constructible_v<T> && std::is_trivially_destructible_v<T>);
-    if (count > SIZE_MAX / sizeof(T)) {
+    if (count > PTRDIFF_MAX / sizeof(T)) {  // no object is larger
       failed_ = true;
       return {};
     }
@@ -62,34 +63,23 @@ class Arena {
   void seal() noexcept { sealed_ = true; }
   [[nodiscard]] bool failed() const noexcept { return failed_; }
   [[nodiscard]] std::size_t bytes_used() const noexcept { return used_; }
-  /// What was taken from the system for them: a header of kAlignment more a request.
-  [[nodiscard]] std::size_t capacity() const noexcept { return used_ + requests_ * kAlignment; }
+  /// What was taken from the system for them, whole slabs.
+  [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
 
  private:
-  struct Block {
-    Block* next;
+  /// At the start of each slab.
+  struct Slab {
+    Slab* next;
   };
 
-  void* take(std::size_t bytes) noexcept {
-    constexpr std::size_t kMost = PTRDIFF_MAX;  // no object is larger
-    if (sealed_ || bytes > kMost - kAlignment) {
-      failed_ = true;
-      return nullptr;
-    }
-    void* memory = ::operator new (bytes + kAlignment, std::align_val_t{kAlignment}, std::nothrow);
-    if (memory == nullptr) {
-      failed_ = true;
-      return nullptr;
-    }
-    blocks_ = new (memory) Block{blocks_};
-    used_ += bytes;
-    ++requests_;
-    return static_cast<char*>(memory) + kAlignment;
-  }
+  [[nodiscard]] void* take(std::size_t bytes) noexcept;
 
-  Block* blocks_ = nullptr;
+  Advice advice_;
+  Slab* slabs_ = nullptr;
+  char* free_ = nullptr;  ///< the largest rest of a slab
+  std::size_t free_bytes_ = 0;
   std::size_t used_ = 0;
-  std::size_t requests_ = 0;
+  std::size_t capacity_ = 0;
   bool sealed_ = false;
   bool failed_ = false;
 };

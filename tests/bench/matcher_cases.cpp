@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "drivers/capture/synthetic/synthetic_source.hpp"
+#include "firmware-app/runtime/large_pages.hpp"
 #include "pipeline/core/simd.hpp"
 #include "pipeline/stereo/census_matcher.hpp"
 #include "pipeline/stereo/sad_matcher.hpp"
@@ -64,7 +65,7 @@ struct Owned {
   }
   void run(const Pair& pair) { (void)matcher->run(view(pair.left), view(pair.right), writable(out)); }
 
-  Arena arena;
+  Arena arena{runtime::advise_large_pages};
   Result<Matcher> matcher;
   cv::Mat out{kHeight, kWidth, CV_16U, cv::Scalar(0)};
 };

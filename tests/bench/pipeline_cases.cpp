@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "drivers/capture/synthetic/synthetic_source.hpp"
+#include "firmware-app/runtime/large_pages.hpp"
 #include "pipeline/pipeline.hpp"
 #include "tests/bench/cases.hpp"
 #include "tests/bench/moving_boxes.hpp"
@@ -109,7 +110,7 @@ class Ours {
   }
 
   StageClock clock_;
-  Arena arena_;
+  Arena arena_{runtime::advise_large_pages};
   Pipeline pipeline_;
   std::span<const TrackReport> tracks_;
 };

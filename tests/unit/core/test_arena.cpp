@@ -57,16 +57,65 @@ TEST(Arena, NothingIsHandedOutAfterSeal) {
   EXPECT_EQ(arena.bytes_used(), 16U);
 }
 
-TEST(Arena, CapacityIsWhatWasUsedAndAHeaderForEachRequest) {
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kSlabsAreShared = false;  // so that the sanitizer sees what leaves its own
+#else
+constexpr bool kSlabsAreShared = true;
+#endif
+
+TEST(Arena, RequestsAreNeighboursInOneSlab) {
+  if (!kSlabsAreShared) GTEST_SKIP() << "under the address sanitizer each request has a slab of its own";
   Arena arena;
   EXPECT_EQ(arena.capacity(), 0U);
-  ASSERT_FALSE(arena.array<int>(4).empty());
-  ASSERT_FALSE(arena.array<std::uint8_t>(100).empty());
+  const std::span<int> first = arena.array<int>(4);
+  const std::span<std::uint8_t> second = arena.array<std::uint8_t>(100);
+  EXPECT_EQ(reinterpret_cast<const std::uint8_t*>(first.data()) + Arena::kAlignment, second.data());
   EXPECT_EQ(arena.bytes_used(), 116U);
-  EXPECT_EQ(arena.capacity(), 116U + 2 * Arena::kAlignment);
+  EXPECT_EQ(arena.capacity(), Arena::kSlabBytes);
   arena.seal();
   EXPECT_TRUE(arena.array<int>(4).empty());
-  EXPECT_EQ(arena.capacity(), 116U + 2 * Arena::kAlignment);
+  EXPECT_EQ(arena.capacity(), Arena::kSlabBytes);
+}
+
+// A large one has slabs of its own, and small ones after it go on in what was left of the slab before.
+TEST(Arena, TheLargestRestOfASlabIsUsedFirst) {
+  if (!kSlabsAreShared) GTEST_SKIP() << "under the address sanitizer each request has a slab of its own";
+  Arena arena;
+  const std::span<std::uint8_t> small = arena.array<std::uint8_t>(64);
+  const std::span<std::uint8_t> large = arena.array<std::uint8_t>(2 * Arena::kSlabBytes - Arena::kAlignment);
+  const std::span<std::uint8_t> after = arena.array<std::uint8_t>(64);
+  ASSERT_EQ(large.size(), 2 * Arena::kSlabBytes - Arena::kAlignment);
+  EXPECT_EQ(after.data(), small.data() + 64);
+  EXPECT_EQ(arena.capacity(), 3 * Arena::kSlabBytes);
+}
+
+TEST(Arena, AdviceIsAskedOfEachSlabBeforeItIsUsed) {
+  static std::size_t bytes = 0;
+  bytes = 0;
+  Arena arena([](void* slab, std::size_t size) noexcept {
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(slab) % (std::size_t{2} * 1024 * 1024), 0U);
+    bytes += size;
+  });
+  EXPECT_EQ(bytes, 0U);
+  ASSERT_FALSE(arena.array<std::uint8_t>(100).empty());
+  EXPECT_EQ(bytes, arena.capacity());
+  ASSERT_FALSE(arena.array<std::uint8_t>(Arena::kSlabBytes).empty());
+  EXPECT_EQ(bytes, arena.capacity());
+}
+
+// Requests that fill a slab to its last byte, one more and one less.
+TEST(Arena, NothingIsHandedOutTwiceAtTheEndOfASlab) {
+  const std::size_t whole = Arena::kSlabBytes - Arena::kAlignment;
+  for (const std::size_t bytes : {whole - 1, whole, whole + 1}) {
+    Arena arena;
+    const std::span<std::uint8_t> first = arena.array<std::uint8_t>(bytes);
+    const std::span<std::uint8_t> second = arena.array<std::uint8_t>(Arena::kAlignment);
+    ASSERT_EQ(first.size(), bytes);
+    std::fill(first.begin(), first.end(), std::uint8_t{1});
+    EXPECT_TRUE(std::all_of(second.begin(), second.end(), [](std::uint8_t v) { return v == 0; })) << bytes;
+    std::fill(second.begin(), second.end(), std::uint8_t{2});
+    EXPECT_TRUE(std::all_of(first.begin(), first.end(), [](std::uint8_t v) { return v == 1; })) << bytes;
+  }
 }
 
 TEST(Arena, MoreThanThereIsFailsAndStaysFailed) {
@@ -77,7 +126,7 @@ TEST(Arena, MoreThanThereIsFailsAndStaysFailed) {
   EXPECT_TRUE(arena.failed());
 }
 
-// With the header that each request has, this many bytes are none.
+// With the header that each slab has, this many bytes are none.
 TEST(Arena, RequestThatOverflowsWithItsHeaderFails) {
   Arena arena;
   EXPECT_TRUE(arena.array<std::uint8_t>(std::numeric_limits<std::size_t>::max() - Arena::kAlignment + 1).empty());
