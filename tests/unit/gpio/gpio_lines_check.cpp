@@ -55,6 +55,7 @@ class Check {
     what_overflows_is_counted();
     active_low_turns_edges_round();
     a_line_in_use_is_refused();
+    if (gpiod::interface() == "2" && !is_simulated()) what_bounces_counts_once_it_is_still();
     if (is_simulated() || !config_.empty()) a_chip_comes_back();
     std::printf("%s\n", failures_ == 0 ? "all hold" : "NOT ALL HOLD");
     return failures_ == 0 ? 0 : 1;
@@ -176,6 +177,21 @@ class Check {
       const std::string told = error.what();
       expect(told.find("busy: held by \"gpio_lines_check\"") != std::string::npos, "refused: " + told);
     }
+  }
+
+  void what_bounces_counts_once_it_is_still() {
+    constexpr milliseconds kStill{50};
+    OutputLines lines = output();
+    drive(lines, false);
+    InputLines edges =
+        open_inputs(std::vector{InputSpec{.name = in_, .edges = Edges::kBoth, .debounce = kStill}}, "gpio_lines_check");
+    for (int i = 0; i < 10; ++i) drive(lines, i % 2 == 0);
+    expect(take(edges, 1).empty(), "what bounces and is as before is no edge");
+    const MonotonicTime before = now();
+    for (int i = 0; i < 11; ++i) drive(lines, i % 2 == 0);
+    const std::vector<EdgeEvent> came = take(edges, 2);
+    expect(came.size() == 1 && came[0].edge == Edge::kRising, "what bounces and stays is one");
+    expect(now() - before >= kStill, "told once it was still for so long");
   }
 
   void plug(bool in) {
