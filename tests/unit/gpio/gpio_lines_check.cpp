@@ -1,6 +1,7 @@
 // What no machine without GPIO chips shows: whether edges of real lines come through libgpiod, once each, in order,
 // with stamps of CLOCK_MONOTONIC, and whether a chip that is unplugged comes back. ctest has no chip and runs it on the
-// simulated one: run it by hand on a board, and in the guest of the emulated one, for each libgpiod that is supported.
+// simulated one, the emulated board (cases/gpio) on gpio-sim, by each libgpiod that is supported; run it by hand on a
+// board of yours.
 //
 //     gpio_lines_check CHIP OUT_LINE IN_LINE                   OUT_LINE is wired to IN_LINE by a jumper
 //     gpio_lines_check CHIP OUT_LINE IN_LINE DEVICE            numbers of lines of gpio-sim; DEVICE is its folder,
