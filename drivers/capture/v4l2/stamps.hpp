@@ -45,6 +45,9 @@ class SequenceCount {
 /// it is not, the count may have come round: of seconds in 32 bits, microseconds in 32 bits or nanoseconds in 64 (which
 /// the arithmetic undoes by itself). What no such count explains is a step: the time then goes on from when the frame
 /// was taken, and stamps are measured from there. A first stamp that is not near the monotonic clock is a step, too.
+///
+/// A frame that waited was taken late, and so is all that is measured from there: in front of the frames' own arrivals,
+/// which cannot be. Each later frame that is ahead of its arrival then moves the times back to it, which is no step.
 /// One thread.
 class StampLine {
  public:
@@ -58,6 +61,7 @@ class StampLine {
     last_raw_ = count(raw);
     last_time_ = count(stamp.time);
     started_ = true;
+    placed_ = placed_ || stamp.step;
     return stamp;
   }
 
@@ -84,12 +88,16 @@ class StampLine {
       const Count later = raw + round - last_raw_;
       if (later == 0 || later > kHalf) continue;
       const Count at = last_time_ + later;
-      if (taken + kSlack - at <= kHour + kSlack) return {time(at), false};
+      if (taken + kSlack - at > kHour + kSlack) continue;
+      const bool ahead = placed_ && at > taken;
+      return {time(ahead ? after_last(taken) : at), false};
     }
-    return {time(taken > last_time_ ? taken : last_time_ + 1), true};
+    return {time(after_last(taken)), true};
   }
+  [[nodiscard]] Count after_last(Count taken) const noexcept { return taken > last_time_ ? taken : last_time_ + 1; }
 
   bool started_ = false;
+  bool placed_ = false;  ///< by an arrival, not by a stamp of the monotonic clock
   Count last_raw_ = 0;
   Count last_time_ = 0;
 };

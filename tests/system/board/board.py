@@ -10,7 +10,9 @@
       --clock steady|real            default steady
   board.py test [--build FOLDER] [--junit FILE] [GROUP|GROUP/CASE]...
                                                        the cases (all), each on a fresh board; exit code 1 where one
-                                                       fails or there is none; what they left: build/board-results
+                                                       fails or there is none; what they left: build/board-results;
+                                                       at the end: how long each took
+      --jobs N                       boards at a time: one a core (4 at most), with the real clock one
   board.py targets [GROUP|GROUP/CASE]...               the CMake targets that the cases want
 
 A case is cases/GROUP/CASE.sh. It prints TAP (guest/tap.sh) and says in its head, in comments: "# wants: bin/PROGRAM ..."
@@ -25,6 +27,7 @@ between frames are 40 ms however busy the host is. What waits for a disk sees ti
 real: the host's clock, a host thread a core.
 """
 import argparse
+import concurrent.futures
 import contextlib
 import ctypes
 import fcntl
@@ -55,6 +58,10 @@ BOOT_LIMIT_S = 300
 # Of the host, beyond the time limit of the board's clock: an emulator on a busy host.
 HOST_FACTOR = 10
 HUNG = 124
+# Of memory, a board has 1 GB.
+MOST_JOBS = 4
+# Loaded before there are threads: a child between fork and exec may not load it.
+LIBC = ctypes.CDLL(None)
 
 
 class BoardError(Exception):
@@ -70,9 +77,9 @@ def note(text):
 
 
 def die_with_parent():
-    """In the child: SIGKILL when board.py is gone, however it went."""
+    """In the child: SIGKILL when board.py, or the thread of it that began the child, is gone, however it went."""
     pr_set_pdeathsig = 1
-    ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+    LIBC.prctl(pr_set_pdeathsig, signal.SIGKILL)
 
 
 def machine_options(clock, folder, disk, payload, forgetful):
@@ -247,7 +254,8 @@ def add(source, target):
 
 def run(clock, things, start, time_limit, results, hear):
     """Runs the script `start` on a board with the things (name in /payload -> path here). hear(line) is told each line
-    of its output. Its exit code. Raises BoardError where no exit code comes."""
+    of its output. Its exit code, and how long it took by the board's clock [s]. Raises BoardError where no exit code
+    comes."""
     disk, state = make(clock)
     with tempfile.TemporaryDirectory(dir=CACHE, prefix="run-") as name, locked(name):
         work = pathlib.Path(name)
@@ -255,7 +263,8 @@ def run(clock, things, start, time_limit, results, hear):
         for inside, path in things.items():
             add(path, tree / inside)
         add(HERE / "guest/limited.sh", tree / ".board/limited.sh")
-        (tree / ".board/start").write_text(f"source /payload/.board/limited.sh\ncd /payload\n{start}\n")
+        (tree / ".board/start").write_text("source /payload/.board/limited.sh\ncd /payload\nSECONDS=0\n"
+                                           f"{start}\ncode=$?\necho \"board: took $SECONDS\"\nexit $code\n")
         image = work / "payload.ext4"
         image.touch()
         os.truncate(image, PAYLOAD_SIZE)
@@ -263,6 +272,7 @@ def run(clock, things, start, time_limit, results, hear):
         incoming = f"exec:cat {shlex.quote(str(state))}"
         limit_s = 30 + HOST_FACTOR * time_limit
         last = "nothing"
+        took = 0
         with Machine(work, clock, disk, image, ["-incoming", incoming]) as machine:
             machine.say(f"start {int(time.time())}")
             try:
@@ -270,7 +280,9 @@ def run(clock, things, start, time_limit, results, hear):
                     if line.startswith("board: end "):
                         code = int(line.removeprefix("board: end "))
                         break
-                    if line != "board: ready":
+                    if line.startswith("board: took "):
+                        took = int(line.removeprefix("board: took "))
+                    elif line != "board: ready":
                         last = line
                         hear(line)
             except TimeoutError:
@@ -281,7 +293,7 @@ def run(clock, things, start, time_limit, results, hear):
             pathlib.Path(results).mkdir(parents=True)
             with tarfile.open(work / "files.tar") as archive:
                 archive.extractall(results)
-    return code
+    return code, took
 
 
 def command_run(args):
@@ -291,7 +303,7 @@ def command_run(args):
         things[pathlib.Path(path).name] = path
     command = shlex.join([f"./{program.name}", *args.arguments])
     start = f"limited {args.time_limit} {shlex.quote(program.name)} {command}"
-    return run(args.clock, things, start, args.time_limit, args.results, lambda line: print(line, flush=True))
+    return run(args.clock, things, start, args.time_limit, args.results, lambda line: print(line, flush=True))[0]
 
 
 class Case:
@@ -307,10 +319,12 @@ class Case:
         self.facts = []  # (name, "ok" | "not ok" | "skip", text)
         self.comments = []
         self.plan = None
+        self.seconds = 0.0  # of the host
+        self.board_seconds = 0
 
     def hear(self, line):
         """A line of TAP; what is none of its kinds is told with the next fact."""
-        print(f"  {line}", flush=True)
+        self.say(f"  {line}")
         if match := re.fullmatch(r"(ok|not ok) \d+ - (.*?)(?: # SKIP ?(.*))?", line):
             kind, name, skipped = match.groups()
             text = "\n".join(self.comments) if skipped is None else f"skipped: {skipped or 'no reason given'}"
@@ -320,6 +334,8 @@ class Case:
             self.plan = int(match[1])
         else:
             self.comments.append(line.removeprefix("# "))
+
+    say = staticmethod(lambda text: print(text, flush=True))
 
     def fail(self, name):
         self.facts.append((name, "not ok", "\n".join(self.comments)))
@@ -358,26 +374,58 @@ def write_junit(cases, path):
     pathlib.Path(path).write_bytes(xml.tostring(root))
 
 
+def run_case(case, args, results):
+    build = pathlib.Path(args.build)
+    things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh"}
+    things.update({pathlib.Path(want).name: build / want for want in case.wants})
+    things.update({f".board/project/{path}": PROJECT / path for path in case.brings})
+    start = (f"mkdir -p {shlex.quote(str(PROJECT.parent))}\n"
+             f"ln -s /payload/.board/project {shlex.quote(str(PROJECT))}\n"
+             f"limited {case.limit} {case.name} bash case.sh")
+    begin = time.monotonic()
+    try:
+        code, case.board_seconds = run(args.clock, things, start, case.limit, results / case.name, case.hear)
+        case.finish(code)
+    except BoardError as error:
+        case.comments += str(error).splitlines()
+        case.say(f"  {error}")
+        case.fail("comes to an end on the board")
+    case.seconds = time.monotonic() - begin
+
+
+def run_side_by_side(cases, jobs, run_one):
+    """What a case says is told when it is over, all at once."""
+    # A board that still runs ends with us; what it leaves is swept by the next call.
+    for ends in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(ends, lambda number, _: os._exit(128 + number))
+    said = {case.name: [] for case in cases}
+    for case in cases:
+        case.say = said[case.name].append
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        # Those that may take longest begin.
+        running = {pool.submit(run_one, case): case for case in sorted(cases, key=lambda case: -case.limit)}
+        for done in concurrent.futures.as_completed(running):
+            case = running[done]
+            done.result()
+            print("\n".join([case.name, *said[case.name]]), flush=True)
+
+
 def command_test(args):
     cases = cases_of(args.names)
-    build = pathlib.Path(args.build)
     results = PROJECT / "build/board-results"
     shutil.rmtree(results, ignore_errors=True)
-    for case in cases:
-        print(f"{case.name}", flush=True)
-        things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh"}
-        things.update({pathlib.Path(want).name: build / want for want in case.wants})
-        things.update({f".board/project/{path}": PROJECT / path for path in case.brings})
-        start = (f"mkdir -p {shlex.quote(str(PROJECT.parent))}\n"
-                 f"ln -s /payload/.board/project {shlex.quote(str(PROJECT))}\n"
-                 f"limited {case.limit} {case.name} bash case.sh")
-        try:
-            case.finish(run(args.clock, things, start, case.limit, results / case.name, case.hear))
-        except BoardError as error:
-            case.comments += str(error).splitlines()
-            print(f"  {error}")
-            case.fail("comes to an end on the board")
+    jobs = args.jobs or (1 if args.clock == "real" else min(os.cpu_count() or 1, MOST_JOBS))
+    begin = time.monotonic()
+    if min(jobs, len(cases)) > 1:
+        run_side_by_side(cases, jobs, lambda case: run_case(case, args, results))
+    else:
+        for case in cases:
+            print(f"{case.name}", flush=True)
+            run_case(case, args, results)
     write_junit(cases, args.junit)
+    for case in cases:
+        print(f"{case.name:<24} {case.seconds:6.0f} s, {case.board_seconds:4d} s of the board's clock")
+    print(f"{'all cases':<24} {time.monotonic() - begin:6.0f} s")
     for case in cases:
         for name, kind, _ in case.facts:
             if kind == "not ok":
@@ -407,6 +455,7 @@ def main():
     several.add_argument("names", nargs="*", metavar="GROUP|GROUP/CASE")
     test = commands.add_parser("test", parents=[with_clock, several])
     test.add_argument("--build", default=PROJECT / "build/aarch64-board", metavar="FOLDER")
+    test.add_argument("--jobs", type=int, default=0, metavar="N")
     test.add_argument("--junit", default=PROJECT / "build/board.xml", metavar="FILE")
     commands.add_parser("targets", parents=[several])
     args = parser.parse_args()

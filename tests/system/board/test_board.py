@@ -4,10 +4,14 @@ started.
 
     test_board.py
 """
+import contextlib
+import io
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -119,6 +123,37 @@ class Cases(unittest.TestCase):
         case = board.cases_of(["daemon/live"])[0]
         self.assertIn("bin/stereotrackd", case.wants)
         self.assertEqual(case.limit, 240)
+
+
+class SideBySide(unittest.TestCase):
+    def setUp(self):
+        for number in (signal.SIGTERM, signal.SIGINT):
+            self.addCleanup(signal.signal, number, signal.getsignal(number))
+
+    def test_cases_run_at_once_and_each_is_told_in_one_piece(self):
+        cases = board.cases_of(["capture", "gpio"])[:2]
+        both = threading.Barrier(2, timeout=20)
+
+        def run_one(case):
+            for number in range(3):
+                both.wait()
+                case.hear(f"ok {number + 1} - {case.name} {number}")
+            case.hear("1..3")
+            case.finish(0)
+
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            board.run_side_by_side(cases, 2, run_one)
+        text = out.getvalue()
+        for case in cases:
+            self.assertEqual([fact[1] for fact in case.facts], ["ok"] * 3)
+            self.assertIn(f"{case.name}\n  ok 1 - {case.name} 0\n  ok 2 - {case.name} 1\n  ok 3 - {case.name} 2\n", text)
+
+    def test_what_one_raises_is_raised(self):
+        def run_one(case):
+            raise board.BoardError(case.name)
+
+        with self.assertRaises(board.BoardError):
+            board.run_side_by_side(board.cases_of(["capture"])[:1], 2, run_one)
 
 
 unittest.main()

@@ -1,6 +1,7 @@
 // What no machine without GPIO chips shows: whether edges of real lines come through libgpiod, once each, in order,
 // with stamps of CLOCK_MONOTONIC, and whether a chip that is unplugged comes back. ctest has no chip and runs it on the
-// simulated one: run it by hand on a board, and in the guest of the emulated one, for each libgpiod that is supported.
+// simulated one, the emulated board (cases/gpio) on gpio-sim, by each libgpiod that is supported; run it by hand on a
+// board of yours.
 //
 //     gpio_lines_check CHIP OUT_LINE IN_LINE                   OUT_LINE is wired to IN_LINE by a jumper
 //     gpio_lines_check CHIP OUT_LINE IN_LINE DEVICE            numbers of lines of gpio-sim; DEVICE is its folder,
@@ -55,6 +56,7 @@ class Check {
     what_overflows_is_counted();
     active_low_turns_edges_round();
     a_line_in_use_is_refused();
+    if (gpiod::interface() == "2" && !is_simulated()) what_bounces_counts_once_it_is_still();
     if (is_simulated() || !config_.empty()) a_chip_comes_back();
     std::printf("%s\n", failures_ == 0 ? "all hold" : "NOT ALL HOLD");
     return failures_ == 0 ? 0 : 1;
@@ -176,6 +178,21 @@ class Check {
       const std::string told = error.what();
       expect(told.find("busy: held by \"gpio_lines_check\"") != std::string::npos, "refused: " + told);
     }
+  }
+
+  void what_bounces_counts_once_it_is_still() {
+    constexpr milliseconds kStill{50};
+    OutputLines lines = output();
+    drive(lines, false);
+    InputLines edges =
+        open_inputs(std::vector{InputSpec{.name = in_, .edges = Edges::kBoth, .debounce = kStill}}, "gpio_lines_check");
+    for (int i = 0; i < 10; ++i) drive(lines, i % 2 == 0);
+    expect(take(edges, 1).empty(), "what bounces and is as before is no edge");
+    const MonotonicTime before = now();
+    for (int i = 0; i < 11; ++i) drive(lines, i % 2 == 0);
+    const std::vector<EdgeEvent> came = take(edges, 2);
+    expect(came.size() == 1 && came[0].edge == Edge::kRising, "what bounces and stays is one");
+    expect(now() - before >= kStill, "told once it was still for so long");
   }
 
   void plug(bool in) {

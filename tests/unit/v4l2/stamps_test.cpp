@@ -125,6 +125,29 @@ TEST(StampLine, AStepThatNoRoundExplainsGoesOnFromTheArrival) {
   EXPECT_FALSE(next.step);
 }
 
+// Three frames wait while the first is taken: nothing may stay ahead of its arrival for that.
+TEST(StampLine, AFirstFrameThatWaitedDoesNotKeepTimesAhead) {
+  StampLine line;
+  const nanoseconds raw = 1s;  // hours from the monotonic clock
+  nanoseconds last = line.next(raw, 20000s).time;
+  EXPECT_EQ(last, 20000s);
+  for (int i = 1; i < 4; ++i) {
+    const nanoseconds taken = 20000s + i * 1ms;
+    const auto stamp = line.next(raw + i * 40ms, taken);
+    EXPECT_FALSE(stamp.step);
+    EXPECT_GT(stamp.time, last);
+    EXPECT_EQ(stamp.time, taken) << i;
+    last = stamp.time;
+  }
+  // From then on by the driver's count, however late it is taken.
+  EXPECT_EQ(line.next(raw + 160ms, 20000s + 45ms).time, 20000s + 43ms);
+}
+
+TEST(StampLine, StampsOfTheMonotonicClockMayBeAheadOfTheirArrival) {
+  StampLine line;
+  for (nanoseconds now = 100s; now < 101s; now += 40ms) EXPECT_EQ(line.next(now + 36ms, now).time, now + 36ms);
+}
+
 TEST(StampLine, TimeNeverStandsStill) {
   StampLine line;
   (void)line.next(100s, 100s);

@@ -1,9 +1,10 @@
 #!/bin/bash
 # Lines of gpio-sim by means of gpiod's tools, then our driver on real chips.
-# wants: tests/gpio_test tests/gpio_board_test
+# wants: tests/gpio_test tests/gpio_board_test tests/gpio_lines_check
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
 
+rig=/sys/kernel/config/gpio-sim/rig
 chip=$(basename "$(readlink /run/rig)")
 value_while_set() {
   gpioset --mode=signal "$chip" 0=1 &
@@ -29,5 +30,9 @@ four_edges() {
 fact "what is driven is read in sysfs" value_while_set
 fact "edges arrive in their order" four_edges
 gtest gpio_test
+fact "edges of a line that drives another come once each, in order, also of a chip that comes back" \
+  ./gpio_lines_check rig 5 6 /sys/devices/platform/gpio-sim.0 $rig
+# The chip came back, maybe by another number.
+ln -sfn "/sys/devices/platform/$(cat $rig/dev_name)/$(cat $rig/bank0/chip_name)" /run/rig
 gtest gpio_board_test
 finish
