@@ -16,9 +16,10 @@
 #include <string_view>
 #include <vector>
 
-/// What differs between libcamera 0.0.3 (Debian 12) and 0.5, at one place:
+/// What differs between libcamera 0.0.3 (Debian 12) and 0.7, at one place:
 /// * which controls there are, and what type they have: they are looked up by name in the maps that libcamera itself
-///   brings, and values are read and made by the type that is found there. No control of libcamera's headers is named;
+///   brings, and values are read and made by the type that is found there. No control of libcamera's headers is named,
+///   and texts are read as bytes, for what get() gives of them has changed;
 /// * how a configuration is asked for: roles are a vector, later a Span, which a vector becomes;
 /// * automatic exposure: one switch, AeEnable; from 0.5 on exposure and gain have modes of their own, beside it.
 namespace stereotrack::libcamera_module::compat {
@@ -52,7 +53,9 @@ template <class Number>
 }
 
 [[nodiscard]] inline std::string text_of(const lc::ControlValue& value) {
-  return value.type() == lc::ControlTypeString ? value.get<std::string>() : std::string();
+  if (value.type() != lc::ControlTypeString) return {};
+  const auto bytes = value.data();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// Of a list that libcamera made by one of its maps; none: it is not there.
