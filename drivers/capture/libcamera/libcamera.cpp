@@ -163,17 +163,10 @@ void tell_controls(const LibcameraSetup& setup, const Settings& settings, std::v
   tell("gain", settings.gain, setup.gain, "");
 }
 
-}  // namespace
-
-std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>* notes) {
-  std::vector<std::string> problems;
+std::unique_ptr<Camera> open_in(std::shared_ptr<Session> session, const Settings& settings,
+                                std::vector<std::string>* notes) {
   Stream::Parts parts;
-  parts.session = Session::get(problems);
-  if (!parts.session) {
-    std::string all;
-    for (const std::string& problem : problems) all += (all.empty() ? "" : "; ") + problem;
-    refuse(settings.device, all);
-  }
+  parts.session = std::move(session);
   const LibcameraModule& module = parts.session->module();
   const std::vector<LibcameraFacts> cameras = parts.session->cameras();
   const std::uint32_t place = find_camera(cameras, settings.device);
@@ -181,6 +174,7 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
   const std::string id = static_cast<const char*>(facts.id);
   const std::string name = settings.device == id ? id : settings.device + " (" + id + ")";
 
+  if (facts.is_gone != 0) refuse(name, "is not connected any more: check its plug and power");
   const std::vector<LibcameraFormat> offered = parts.session->formats(place);
   const Choice choice = choose_format(offered, settings, name);
   const KnownFormat& known = *choice.known;
@@ -241,6 +235,26 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
   return stream;
 }
 
+}  // namespace
+
+std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>* notes) {
+  std::vector<std::string> problems;
+  const std::shared_ptr<Session> session = Session::get(problems);
+  if (!session) {
+    std::string all;
+    for (const std::string& problem : problems) all += (all.empty() ? "" : "; ") + problem;
+    refuse(settings.device, all);
+  }
+  try {
+    return open_in(session, settings, notes);
+  } catch (const std::runtime_error& error) {
+    // Its manager looks once. Whoever has the other cameras closes them when they are lost, and opens them again.
+    if (session->module().renew(session->manager()) == 0) throw;
+    throw std::runtime_error(std::string(error.what()) +
+                             "; devices were plugged in meanwhile: libcamera looks for them once none is open");
+  }
+}
+
 Listing list_cameras() {
   Listing listing;
   const std::shared_ptr<Session> session = Session::get(listing.problems);
@@ -251,6 +265,7 @@ Listing list_cameras() {
   if (cameras.empty()) listing.problems.push_back("libcamera: " + cameras_text(cameras));
   for (std::uint32_t i = 0; i < cameras.size(); ++i) {
     const LibcameraFacts& facts = cameras[i];
+    if (facts.is_gone != 0) continue;
     CameraFacts& camera = listing.cameras.emplace_back();
     camera.id = static_cast<const char*>(facts.id);
     camera.model = static_cast<const char*>(facts.model);

@@ -22,7 +22,8 @@ namespace stereotrack::capture::libcamera {
 
 /// What is wanted of one sensor. What is not said stays as libcamera has it.
 struct Settings {
-  std::string device;           ///< id, place in list_cameras() from 0, or what only its id or model has
+  std::string device;           ///< id, or what only its id or model has; or its place in list_cameras() from 0, which
+                                ///< may be another after a camera was unplugged
   int width = 0;                ///< [px]; 0 with height 0: as libcamera has it
   int height = 0;               ///< [px]
   std::string format = "auto";  ///< a name of format_names(); auto: grey, where there is none the cheapest to read
@@ -45,7 +46,10 @@ struct Settings {
 /// * their clock is found by when frames come, clock_map() follows it;
 /// * settings in force are those that libcamera tells with each frame;
 /// * sequences count what libcamera lost only where its pipeline does, so CameraInfo::counts_lost is false;
-/// * a camera that is gone may just fall silent: libcamera does not tell in every case. StereoCameras has a time-out.
+/// * a camera that is gone just falls silent: StereoCameras has a time-out;
+/// * one that comes back, or comes late, is found by another manager alone, which there can only be once no camera is
+///   open. So where open() fails and devices were plugged in since the manager looked, the cameras that are open are
+///   lost, as failure() says, and may be opened again.
 [[nodiscard]] std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>* notes = nullptr);
 
 /// What one camera is and offers, for people.

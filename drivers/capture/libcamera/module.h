@@ -38,6 +38,8 @@ typedef struct LibcameraFacts {
   int64_t exposure_least, exposure_most;
   int64_t duration_least, duration_most; /* of a frame, in the mode that libcamera would take by itself */
   float gain_least, gain_most;           /* 1 = none */
+  uint32_t is_gone;                      /* it was unplugged */
+  uint32_t reserved;
 } LibcameraFacts;
 
 /* A way in which a camera's pictures can lie in memory, and sizes for it [px]. */
@@ -118,7 +120,11 @@ typedef struct LibcameraModule {
   /* No stream is open any more. */
   void (*close_manager)(LibcameraManager* manager);
 
-  /* Cameras that there are now; numbers are good until the next call. */
+  /* A camera that is wanted is not there. 1: devices were plugged in since the manager was opened, and it may be among
+     them: all streams are lost, for another manager has to look, and there is only one at a time. 0: nothing was. */
+  int32_t (*renew)(LibcameraManager* manager);
+
+  /* Cameras that there are, or were and are gone; numbers are good until the next call. */
   uint32_t (*count)(LibcameraManager* manager);
   /* 0: there is none of that number. */
   int32_t (*facts)(LibcameraManager* manager, uint32_t camera, LibcameraFacts* facts);
@@ -132,7 +138,7 @@ typedef struct LibcameraModule {
   int32_t (*plane)(LibcameraStream* stream, uint32_t buffer, uint32_t plane, const uint8_t** data, uint64_t* bytes);
   /* Queues all buffers. 0: `why`. Once a stream. */
   int32_t (*start)(LibcameraStream* stream, char* why);
-  /* Whatever state it is in; no other thread is in it. */
+  /* Whatever state it is in; no other thread is in it. Of a camera that was unplugged, libcamera's part stays behind. */
   void (*close)(LibcameraStream* stream);
   /* After kLibcameraLost: what happened, such as "was unplugged". Lives as long as the stream. */
   const char* (*loss)(LibcameraStream* stream);

@@ -17,6 +17,7 @@ typedef struct ScriptedEye {
   int32_t refuses_start;
   int32_t holds_no_rate;
   int32_t has_no_controls;
+  int32_t is_gone;
   int32_t splits_planes;  /* of NV12: they lie apart */
   int32_t stride;         /* 0: rows close together */
   uint32_t buffers;       /* 0: what is wanted */
@@ -30,6 +31,7 @@ typedef struct Script {
   int32_t refuses_manager;
   int32_t cameras; /* that there are */
   int32_t managers_opened, managers_closed;
+  int32_t plugged_in; /* something was, since: renew() loses all streams */
   ScriptedEye eyes[kScriptCameras];
   void (*reset)(void);
   /* Into a free buffer, each byte of which becomes `shade`; its number, or -1: none is free, the frame is lost.

@@ -107,12 +107,22 @@ static LibcameraManager* open_manager(char* why) {
     return NULL;
   }
   ++script.managers_opened;
+  script.plugged_in = 0;
   return calloc(1, sizeof(LibcameraManager));
 }
 
 static void close_manager(LibcameraManager* manager) {
   ++script.managers_closed;
   free(manager);
+}
+
+static int32_t renew(LibcameraManager* manager) {
+  (void)manager;
+  if (!script.plugged_in) return 0;
+  for (int i = 0; i < kScriptCameras; ++i) {
+    if (streams[i] != NULL) lose(i);
+  }
+  return 1;
 }
 
 static uint32_t count(LibcameraManager* manager) {
@@ -127,6 +137,7 @@ static int32_t facts(LibcameraManager* manager, uint32_t camera, LibcameraFacts*
   snprintf(out->id, sizeof out->id, "/base/i2c@%u/imx219@10", camera);
   strcpy(out->model, "imx219");
   strcpy(out->location, "external");
+  out->is_gone = (uint32_t)script.eyes[camera].is_gone;
   if (script.eyes[camera].has_no_controls) return 1;
   out->exposure_least = 100000;
   out->exposure_most = 20000000;
@@ -262,9 +273,9 @@ VISIBLE Script* the_script(void) {
 #endif
 VISIBLE const LibcameraModule* stereotrack_libcamera_module(void);
 VISIBLE const LibcameraModule* stereotrack_libcamera_module(void) {
-  static const LibcameraModule kTable = {SCRIPTED_VERSION, SCRIPTED_SIZE, library,      open_manager, close_manager,
-                                         count,            facts,         format,       open_stream,  plane,
-                                         start,            close_stream,  loss,         take,         give_back};
+  static const LibcameraModule kTable = {SCRIPTED_VERSION, SCRIPTED_SIZE, library, open_manager, close_manager,
+                                         renew,            count,         facts,   format,       open_stream,
+                                         plane,            start,         close_stream, loss,    take, give_back};
 #ifdef SCRIPTED_LACKS
   (void)symbol_of_another_libcamera();
 #endif

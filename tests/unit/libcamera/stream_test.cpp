@@ -137,6 +137,32 @@ TEST_F(LibcameraCamera, BothShareOneManagerWhichTheLastOneCloses) {
   EXPECT_EQ(script_->managers_closed, 1);
 }
 
+TEST_F(LibcameraCamera, OneThatCameLateMakesTheOthersEndSoThatLibcameraCanLookAnew) {
+  script_->cameras = 1;
+  auto left = started(settings("0"));
+  EXPECT_EQ(refusal(settings("1")).find("plugged in"), std::string::npos);
+  SensorFrame at;
+  EXPECT_EQ(left->take(at), Take::kNothing);  // nothing was: it goes on
+  script_->plugged_in = 1;
+  EXPECT_THAT(refusal(settings("1")), HasSubstr("no camera of that place; it knows 0: /base/i2c@0/imx219@10 (imx219); "
+                                                "devices were plugged in meanwhile"));
+  EXPECT_EQ(left->take(at), Take::kLost);
+  left.reset();
+  script_->cameras = 2;
+  left = open(settings("0"));
+  EXPECT_EQ(open(settings("1"))->info().width, 640);
+  EXPECT_EQ(script_->managers_opened, 2);
+}
+
+TEST_F(LibcameraCamera, ThatIsGoneIsToldAndNotListed) {
+  script_->eyes[1].is_gone = 1;
+  EXPECT_EQ(refusal(settings("1")),
+            "camera 1 (/base/i2c@1/imx219@10): is not connected any more: check its plug and power");
+  EXPECT_EQ(script_->eyes[1].wish.width, 0);  // it was left alone
+  ASSERT_EQ(list_cameras().cameras.size(), 1U);
+  EXPECT_EQ(list_cameras().cameras[0].id, "/base/i2c@0/imx219@10");
+}
+
 TEST_F(LibcameraCamera, FramesAreLeasedAndGoBackInAnyOrder) {
   Settings wish = settings("0");
   wish.buffers = 4;

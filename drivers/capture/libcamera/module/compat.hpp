@@ -7,6 +7,8 @@
 #include <libcamera/property_ids.h>
 #include <libcamera/stream.h>
 
+#include <sys/types.h>
+
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -21,6 +23,7 @@
 ///   brings, and values are read and made by the type that is found there. No control of libcamera's headers is named,
 ///   and texts are read as bytes, for what get() gives of them has changed;
 /// * how a configuration is asked for: roles are a vector, later a Span, which a vector becomes;
+/// * which device nodes are a camera's: the manager is asked by node, later the camera by a property, SystemDevices;
 /// * automatic exposure: one switch, AeEnable; from 0.5 on exposure and gain have modes of their own, beside it.
 namespace stereotrack::libcamera_module::compat {
 
@@ -81,6 +84,27 @@ class Named {
 
 [[nodiscard]] inline Named metadata(std::string_view name) { return {lc::controls::controls, name}; }
 [[nodiscard]] inline Named property(std::string_view name) { return {lc::properties::properties, name}; }
+
+/// Whether the node, a video device, is one of the camera's. What a manager says of it depends on its version, so it is
+/// a parameter of a template.
+template <class Manager>
+[[nodiscard]] bool is_node_of(Manager& manager, const std::shared_ptr<lc::Camera>& camera, dev_t node) {
+  if constexpr (requires { manager.get(node); }) {
+    return manager.get(node) == camera;
+  } else {
+    for (const auto& [number, id] : lc::properties::properties) {
+      if (id->name() != "SystemDevices" || !camera->properties().contains(number)) continue;
+      const lc::ControlValue& value = camera->properties().get(number);
+      const auto bytes = value.data();
+      for (std::size_t at = 0; at + sizeof(std::int64_t) <= bytes.size(); at += sizeof(std::int64_t)) {
+        std::int64_t each = 0;
+        std::memcpy(&each, bytes.data() + at, sizeof each);
+        if (static_cast<dev_t>(each) == node) return true;
+      }
+    }
+    return false;
+  }
+}
 
 /// A control that a camera has.
 class Settable {

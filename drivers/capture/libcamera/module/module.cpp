@@ -1,5 +1,13 @@
 /// Fills the table of ../module.h by the libcamera that it is built against. Exceptions end here: whatever may throw
 /// runs inside guarded().
+///
+/// A camera that is unplugged must not take the process with it, and libcamera (0.0.3 at least, on a machine with udev)
+/// ends the process in two cases, by assertions of its own, which both are kept from happening:
+/// * stop() of a camera whose device is gone: its buffers do not come back. Such a camera is left as it is, never
+///   stopped and never destroyed; its memory stays until the process ends;
+/// * a device that comes back: its camera has the id of the one that was. So the manager does not learn of devices that
+///   come or go: udev_monitor_enable_receiving() below takes the place of libudev's. Another manager has to look, once
+///   no camera is open: renew().
 #include "drivers/capture/libcamera/module.h"
 
 #include <libcamera/camera.h>
@@ -28,6 +36,7 @@
 
 #include "drivers/capture/libcamera/module/compat.hpp"
 #include "drivers/capture/libcamera/module/handover.hpp"
+#include "drivers/capture/libcamera/module/nodes.hpp"
 
 namespace lc = ::libcamera;
 namespace lm = stereotrack::libcamera_module;
@@ -191,7 +200,22 @@ void list_formats(lc::Camera& camera, lc::StreamRole role, std::vector<Libcamera
 }  // namespace
 
 struct LibcameraManager {
+  /// A camera and the video devices that are it, as they were at start.
+  struct Known {
+    std::shared_ptr<lc::Camera> camera;
+    std::vector<lm::Node> nodes;
+  };
+  [[nodiscard]] bool is_gone(const lc::Camera& camera) const {
+    for (const Known& each : known) {
+      if (each.camera.get() == &camera) return !lm::are_there(each.nodes);
+    }
+    return false;
+  }
+
+  std::vector<lm::Node> nodes;  ///< that there were before it looked
   lc::CameraManager manager;
+  std::vector<Known> known;
+  std::vector<LibcameraStream*> streams;             ///< that are open
   std::vector<std::shared_ptr<lc::Camera>> cameras;  ///< as of the last count()
   std::shared_ptr<lc::Camera> formats_of;
   std::vector<LibcameraFormat> formats;
@@ -200,14 +224,13 @@ struct LibcameraManager {
 /// One camera, acquired. libcamera's thread calls completed() and disconnected(), the queueing thread requeue().
 struct LibcameraStream {
  public:
-  LibcameraStream(std::shared_ptr<lc::Camera> of, std::unique_ptr<lc::CameraConfiguration> configuration)
-      : camera_(std::move(of)), configuration_(std::move(configuration)), allocator_(camera_) {}
+  LibcameraStream(LibcameraManager& manager, std::shared_ptr<lc::Camera> of,
+                  std::unique_ptr<lc::CameraConfiguration> configuration)
+      : manager_(manager), camera_(std::move(of)), configuration_(std::move(configuration)), allocator_(camera_) {}
   LibcameraStream(const LibcameraStream&) = delete;
   LibcameraStream& operator=(const LibcameraStream&) = delete;
   ~LibcameraStream() {
-    ending_.store(true, std::memory_order_relaxed);
-    handover_.end();
-    if (queueing_.joinable()) queueing_.join();
+    end();
     if (started_) {
       (void)camera_->stop();
       camera_->requestCompleted.disconnect(this);
@@ -254,6 +277,15 @@ struct LibcameraStream {
     queueing_ = std::thread([this] { requeue(); });
   }
 
+  /// What is left may stay for ever.
+  void end() {
+    ending_.store(true, std::memory_order_relaxed);
+    handover_.end();
+    if (queueing_.joinable()) queueing_.join();
+  }
+
+  [[nodiscard]] LibcameraManager& manager() noexcept { return manager_; }
+  [[nodiscard]] const lc::Camera& camera() const noexcept { return *camera_; }
   [[nodiscard]] std::uint32_t stride() const { return configuration_->at(0).stride; }
   [[nodiscard]] lm::Handover& handover() noexcept { return handover_; }
   [[nodiscard]] const std::vector<Mapping>& mappings() const noexcept { return mappings_; }
@@ -353,6 +385,7 @@ struct LibcameraStream {
     }
   }
 
+  LibcameraManager& manager_;
   std::shared_ptr<lc::Camera> camera_;
   std::unique_ptr<lc::CameraConfiguration> configuration_;
   lc::FrameBufferAllocator allocator_;
@@ -379,10 +412,16 @@ const char* library() { return lc::CameraManager::version().c_str(); }
 LibcameraManager* open_manager(char* why) {
   return guarded<LibcameraManager*>(why, nullptr, [&]() -> LibcameraManager* {
     auto manager = std::make_unique<LibcameraManager>();
+    manager->nodes = lm::list_nodes();
     const int error = manager->manager.start();
-    if (error == 0) return manager.release();
-    put_why(why, "does not start to look for cameras (" + error_text(-error) + ")");
-    return nullptr;
+    if (error != 0) throw std::runtime_error("does not start to look for cameras (" + error_text(-error) + ")");
+    for (const std::shared_ptr<lc::Camera>& camera : manager->manager.cameras()) {
+      LibcameraManager::Known& known = manager->known.emplace_back(LibcameraManager::Known{camera, {}});
+      for (const lm::Node& node : lm::list_nodes()) {
+        if (compat::is_node_of(manager->manager, camera, node.number)) known.nodes.push_back(node);
+      }
+    }
+    return manager.release();
   });
 }
 
@@ -390,9 +429,20 @@ void close_manager(LibcameraManager* manager) {
   (void)guarded<int>(nullptr, 0, [&] {
     const std::unique_ptr<LibcameraManager> owned(manager);
     owned->cameras.clear();
+    owned->known.clear();
     owned->formats_of.reset();
     owned->manager.stop();
     return 0;
+  });
+}
+
+std::int32_t renew(LibcameraManager* manager) {
+  return guarded<std::int32_t>(nullptr, 0, [&] {
+    if (!lm::are_there_others(manager->nodes)) return 0;
+    for (LibcameraStream* const stream : manager->streams) {
+      stream->handover().lose("has to be opened anew, for libcamera has to look for devices that were plugged in");
+    }
+    return 1;
   });
 }
 
@@ -410,6 +460,7 @@ std::int32_t facts(LibcameraManager* manager, std::uint32_t camera, LibcameraFac
     lc::Camera& of = *manager->cameras[camera];
     *facts = {};
     put_text(facts->id, of.id());
+    facts->is_gone = manager->is_gone(of) ? 1 : 0;
     put_text(facts->model, model_of(of));
     put_text(facts->location, location_of(of));
     const compat::Settable exposure(of.controls(), "ExposureTime");
@@ -446,6 +497,7 @@ std::int32_t open(LibcameraManager* manager, std::uint32_t camera, const Libcame
   return guarded<std::int32_t>(why, kLibcameraFailed, [&]() -> std::int32_t {
     if (camera >= manager->cameras.size()) throw std::runtime_error("there is no such camera any more");
     const std::shared_ptr<lc::Camera> of = manager->cameras[camera];
+    if (manager->is_gone(*of)) throw std::runtime_error("is not connected any more: check its plug and power");
     auto configuration =
         compat::configuration(*of, wish->is_raw != 0 ? lc::StreamRole::Raw : lc::StreamRole::VideoRecording);
     if (!configuration) throw std::runtime_error("offers no configuration");
@@ -466,9 +518,10 @@ std::int32_t open(LibcameraManager* manager, std::uint32_t camera, const Libcame
     const bool is_other =
         (wish->fourcc != 0 && chosen.pixelFormat != wanted_format) || (wish->width > 0 && chosen.size != wanted_size);
     if (is_other) return kLibcameraAdjusted;
-    auto opened = std::make_unique<LibcameraStream>(of, std::move(configuration));
+    auto opened = std::make_unique<LibcameraStream>(*manager, of, std::move(configuration));
     opened->set_up(*wish, *setup);
     setup->stride = opened->stride();
+    manager->streams.push_back(opened.get());
     *stream = opened.release();
     return kLibcameraOpened;
   });
@@ -492,7 +545,13 @@ std::int32_t start(LibcameraStream* stream, char* why) {
 
 void close(LibcameraStream* stream) {
   (void)guarded<int>(nullptr, 0, [&] {
-    delete stream;
+    LibcameraManager& manager = stream->manager();
+    std::erase(manager.streams, stream);
+    if (manager.is_gone(stream->camera())) {
+      stream->end();
+    } else {
+      delete stream;
+    }
     return 0;
   });
 }
@@ -514,6 +573,7 @@ extern "C" __attribute__((visibility("default"))) const LibcameraModule* stereot
                                          library,
                                          open_manager,
                                          close_manager,
+                                         renew,
                                          count,
                                          facts,
                                          format,
@@ -526,3 +586,7 @@ extern "C" __attribute__((visibility("default"))) const LibcameraModule* stereot
                                          give_back};
   return &kTable;
 }
+
+/// libcamera finds this one, not libudev's: a module's own symbols come first for the libraries that it brings.
+extern "C" __attribute__((visibility("default"))) int udev_monitor_enable_receiving(void* /*monitor*/);
+extern "C" int udev_monitor_enable_receiving(void* /*monitor*/) { return 0; }
