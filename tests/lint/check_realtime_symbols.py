@@ -36,6 +36,14 @@ ROOTS_OF_THREADS = [
     "stereotrack::capture::Film::clock_map(",
     "stereotrack::capture::StereoCameras::step(",
     "stereotrack::capture::StereoCameras::figures(",
+    "stereotrack::capture::libcamera::Stream::take(",
+    "stereotrack::capture::libcamera::Stream::give_back(",
+    "stereotrack::capture::libcamera::Stream::picture(",
+    "stereotrack::capture::libcamera::Stream::clock_map(",
+    "stereotrack::capture::libcamera::Stream::counters(",
+    # Of its module, through a table of C functions.
+    "stereotrack::libcamera_module::Handover::take(",
+    "stereotrack::libcamera_module::Handover::give_back(",
     "stereotrack::capture::v4l2::Stream::take(",
     "stereotrack::capture::v4l2::Stream::give_back(",
     "stereotrack::capture::v4l2::Stream::picture(",
@@ -64,6 +72,7 @@ SET_UP = [
 THREADS = [
     r"clock_gettime|clock_nanosleep|adjtimex",
     r"syscall|ppoll|sendto|ioctl",  # futexes, frames, datagrams
+    r"read|write",            # of an event's descriptor that does not wait
     r"__errno_location|pow",  # pow: a gain that is told in decibels
     r"stereotrack::allocations_of_this_thread\(\)",  # the program's own count
     r"pb_(encode|get_encoded_size|ostream_from_buffer)",  # nanopb: into the caller's memory, no heap
