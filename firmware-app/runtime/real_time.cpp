@@ -139,11 +139,13 @@ void* Thread::run(void* self) noexcept {
     (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
   }
   stack_t faults{};
+  stack_t before{};
   faults.ss_sp = thread.fault_stack_.get();
   faults.ss_size = kFaultStackBytes;
-  (void)sigaltstack(&faults, nullptr);
+  (void)sigaltstack(&faults, &before);
   thread.decided_.acquire();
   if (thread.begun_) thread.body_();
+  (void)sigaltstack(&before, nullptr);  // a sanitizer unmaps the one that it finds when a thread ends
   return nullptr;
 }
 
