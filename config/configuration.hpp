@@ -28,7 +28,7 @@ struct SourceConfig {
 };
 
 /// Whose cameras they are.
-enum class CameraDriver : unsigned char { kV4l2 };
+enum class CameraDriver : unsigned char { kV4l2, kLibcamera };
 
 struct CameraDeviceConfig {
   std::string device;  ///< as the driver names it

@@ -77,6 +77,17 @@ std::string one_camera_has_both_views(const Configuration& c) {
   return "the left camera has both views, " + quoted(c.camera.right.device) + " would be a third: leave it out";
 }
 
+std::string libcamera_connects_by_itself(const Configuration& c) {
+  if (!has_cameras(c) || c.camera.driver != CameraDriver::kLibcamera) return {};
+  if (c.camera.left.sensor.empty() && c.camera.right.sensor.empty()) return {};
+  return "libcamera connects a camera's parts by itself: leave the sensor out, name it as the device";
+}
+
+std::string libcamera_has_no_black_level(const Configuration& c) {
+  if (!has_cameras(c) || c.camera.driver != CameraDriver::kLibcamera || c.camera.black_level < 0) return {};
+  return "libcamera sets the black level by itself: leave it out";
+}
+
 std::string exposure_fits_into_a_period(const Configuration& c) {
   if (c.camera.exposure_us * c.camera.fps < 1e6) return {};
   return "an exposure takes longer than there is time between two frames: shorten it, or lower camera.fps";
@@ -108,6 +119,10 @@ std::span<const Rule> rules() {
       {"cameras_have_devices", {"camera.left.device"}, cameras_have_devices},
       {"cameras_differ", {"camera.right.device", "camera.left.device"}, cameras_differ},
       {"one_camera_has_both_views", {"camera.right.device", "camera.side_by_side"}, one_camera_has_both_views},
+      {"libcamera_connects_by_itself",
+       {"camera.left.sensor", "camera.right.sensor", "camera.driver"},
+       libcamera_connects_by_itself},
+      {"libcamera_has_no_black_level", {"camera.black_level", "camera.driver"}, libcamera_has_no_black_level},
       {"exposure_fits_into_a_period", {"camera.exposure_us", "camera.fps"}, exposure_fits_into_a_period},
       {"split_stays_split", {"objects.merge_depth", "objects.split_depth"}, split_stays_split},
   };

@@ -56,14 +56,16 @@ std::vector<Key> keys_of(Configuration& c) {
           "Rows that the right picture is moved down (negative: up), for video files whose views were cut at different "
           "heights."),
 
-      key("camera.driver", c.camera.driver, {{"v4l2", CameraDriver::kV4l2}},
-          "Whose cameras they are: the kernel's, Video4Linux 2."),
+      key("camera.driver", c.camera.driver, {{"v4l2", CameraDriver::kV4l2}, {"libcamera", CameraDriver::kLibcamera}},
+          "Whose cameras they are: the kernel's, Video4Linux 2; or libcamera's, through a module that is loaded at run "
+          "time."),
       key("camera.left.device", c.camera.left.device, nullptr,
           "The left camera, for source.name = \"cameras\": /dev/video0, a link to it that does not change with the "
-          "order of plugging in (/dev/v4l/by-path/...), or bus:NAME, name:CARD."),
+          "order of plugging in (/dev/v4l/by-path/...), or bus:NAME, name:CARD; of libcamera its id, its place in the "
+          "list from 0, or a part that only its id or model has."),
       key("camera.left.sensor", c.camera.left.sensor, nullptr,
           "Its sensor's name, or how it begins, where the driver has the program connect the camera's parts (media "
-          "controller) and there are several; empty: the one that is connected, or the nearest."),
+          "controller) and there are several; empty: the one that is connected, or the nearest. Not with libcamera."),
       key("camera.right.device", c.camera.right.device, nullptr, "The right one; empty: one camera, in mono."),
       key("camera.right.sensor", c.camera.right.sensor, nullptr, "Likewise."),
       key("camera.side_by_side", c.camera.side_by_side,
@@ -80,7 +82,7 @@ std::vector<Key> keys_of(Configuration& c) {
       key("camera.exposure_us", c.camera.exposure_us, 0, 1e7, "us", "Exposure of both; 0: automatic, each by itself."),
       key("camera.gain", c.camera.gain, 0, 1000, "", "Gain of both, 1 is none; 0: automatic, each by itself."),
       key("camera.black_level", c.camera.black_level, -1, 65535, "",
-          "Black level of both in the driver's own unit; -1: as the driver has it."),
+          "Black level of both in the driver's own unit; -1: as the driver has it. Not with libcamera."),
       key("camera.readout_us", c.camera.readout_us, 0, 1e7, "us",
           "From the end of an exposure to the end of its frame, where the driver stamps the latter; 0: as it tells."),
       key("camera.triggered", c.camera.triggered,

@@ -18,8 +18,13 @@ std::string source_name(const config::CameraConfig& camera) {
   return camera.left.device + (camera.right.device.empty() ? "" : ", " + camera.right.device);
 }
 
+bool is_libcamera(const config::CameraConfig& camera) { return camera.driver == config::CameraDriver::kLibcamera; }
+
+std::optional<double> set_by_user(double value) { return value > 0 ? std::optional(value) : std::nullopt; }
+
 void check_format(const config::Loaded& loaded) {
-  const std::vector<std::string_view> names = capture::v4l2::format_names();
+  const std::vector<std::string_view> names =
+      is_libcamera(loaded.configuration.camera) ? capture::libcamera::format_names() : capture::v4l2::format_names();
   const std::string& wanted = loaded.configuration.camera.format;
   if (std::find(names.begin(), names.end(), wanted) != names.end()) return;
   std::string all;
@@ -36,7 +41,7 @@ std::string line_of(Side side, const capture::CameraInfo& info) {
 
 }  // namespace
 
-capture::v4l2::Settings camera_settings(const config::CameraConfig& camera, Side side) {
+capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, Side side) {
   capture::v4l2::Settings settings;
   const config::CameraDeviceConfig& of_side = side == Side::kLeft ? camera.left : camera.right;
   settings.device = of_side.device;
@@ -46,10 +51,24 @@ capture::v4l2::Settings camera_settings(const config::CameraConfig& camera, Side
   settings.format = camera.format;
   settings.fps = camera.fps;
   settings.buffers = camera.buffers;
-  if (camera.exposure_us > 0) settings.exposure_us = camera.exposure_us;
-  if (camera.gain > 0) settings.gain = camera.gain;
+  settings.exposure_us = set_by_user(camera.exposure_us);
+  settings.gain = set_by_user(camera.gain);
   if (camera.black_level >= 0) settings.black_level = camera.black_level;
-  if (camera.readout_us > 0) settings.readout_us = camera.readout_us;
+  settings.readout_us = set_by_user(camera.readout_us);
+  return settings;
+}
+
+capture::libcamera::Settings libcamera_settings(const config::CameraConfig& camera, Side side) {
+  capture::libcamera::Settings settings;
+  settings.device = side == Side::kLeft ? camera.left.device : camera.right.device;
+  settings.width = camera.width;
+  settings.height = camera.height;
+  settings.format = camera.format;
+  settings.fps = camera.fps;
+  settings.buffers = camera.buffers;
+  settings.exposure_us = set_by_user(camera.exposure_us);
+  settings.gain = set_by_user(camera.gain);
+  settings.readout_us = set_by_user(camera.readout_us);
   return settings;
 }
 
@@ -68,7 +87,9 @@ capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
                                            std::function<void(const std::string&)> say) {
   return [camera, say = std::move(say)](Side side) {
     std::vector<std::string> notes;
-    std::unique_ptr<capture::Camera> opened = capture::v4l2::open(camera_settings(camera, side), &notes);
+    std::unique_ptr<capture::Camera> opened = is_libcamera(camera)
+                                                  ? capture::libcamera::open(libcamera_settings(camera, side), &notes)
+                                                  : capture::v4l2::open(v4l2_settings(camera, side), &notes);
     for (const std::string& note : notes) say(note);
     return opened;
   };

@@ -74,6 +74,22 @@ TEST(Rules, CamerasNeedDevicesOfTheirOwn) {
   EXPECT_EQ(refused({left, override_layer("camera.right.device=/dev/video0")}), "");
 }
 
+TEST(Rules, LibcameraDoesByItselfWhatV4l2IsTold) {
+  const Layer cameras = override_layer("source.name=cameras");
+  const Layer left = override_layer("camera.left.device=0");
+  const Layer driver = override_layer("camera.driver=libcamera");
+  EXPECT_EQ(refused({cameras, left, driver}), "");
+  EXPECT_EQ(refused({cameras, left, driver, override_layer("camera.right.sensor=imx219")})
+                .find("--set camera.right.sensor=imx219: "),
+            0U);
+  EXPECT_EQ(
+      refused({cameras, left, driver, override_layer("camera.black_level=64")}).find("--set camera.black_level=64: "),
+      0U);
+  EXPECT_EQ(
+      refused({cameras, left, override_layer("camera.right.sensor=imx219"), override_layer("camera.black_level=64")}),
+      "");
+}
+
 TEST(Rules, AnExposureFitsBetweenTwoFrames) {
   EXPECT_EQ(refused({override_layer("camera.exposure_us=33000")}), "");
   EXPECT_EQ(refused({override_layer("camera.exposure_us=33334")}).find("--set camera.exposure_us=33334: "), 0U);
