@@ -85,15 +85,21 @@ struct ClockFacts {
                                        ///< the kernel TAI - UTC
 };
 
-/// A camera of any driver. Libcamera's cameras, once listed, are further rows of this.
+/// A camera of any driver, in the words of the kernel's. Of libcamera's: path is its id, card its model, bus where it
+/// looks to, driver "libcamera"; rates are its fastest and its slowest.
 struct CameraFound {
   config::CameraDriver driver = config::CameraDriver::kV4l2;
   capture::v4l2::CameraFacts facts;
 };
+struct CamerasFound {
+  std::vector<CameraFound> cameras;
+  std::string libcamera;                        ///< its version and module; empty: there is none
+  std::vector<std::string> libcamera_problems;  ///< why there is none, or why a newer one is not taken
+};
 
 /// A line of the configuration, looked up and not requested.
 struct LineFound {
-  std::string key;       ///< signal[1].line
+  std::string key;       ///< "signal NAME", "input NAME"
   std::string line;      ///< CHIP:LINE
   bool output = true;    ///< false: an input
   std::string consumer;  ///< who holds it now; empty: nobody
@@ -105,6 +111,7 @@ struct CaptureMeasure {
   std::string side;      ///< "left", "right"
   std::string name;      ///< CameraInfo's
   std::string delivers;  ///< 640x480 grey8
+  bool colour = true;
   double period_ms = 0;  ///< nominal
   std::uint64_t frames = 0;
   std::uint64_t damaged = 0;
@@ -179,7 +186,7 @@ struct Findings {
   std::vector<gpio::gpiod::ChipListing> chips;
   std::vector<PwmChip> pwm;
   ClockFacts clocks;
-  std::vector<CameraFound> cameras;
+  CamerasFound found;
   std::vector<LineFound> lines;
   bool suggestion = false;  ///< configuration's cameras were chosen here: suggest()
   bool has_calibration = false;

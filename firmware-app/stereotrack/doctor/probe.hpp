@@ -26,8 +26,8 @@ namespace stereotrack::doctor {
 /// and core. Asks as the daemon does and lets go again; nothing with realtime.mode = "off".
 [[nodiscard]] std::vector<runtime::Missing> ask_rights(const config::RealTimeConfig& realtime);
 
-/// All cameras, of all drivers.
-[[nodiscard]] std::vector<CameraFound> probe_cameras();
+/// All cameras, of all drivers. Waits for libcamera, where there is a module for it.
+[[nodiscard]] CamerasFound probe_cameras();
 
 /// The lines that the configuration names, looked up: none is requested or driven.
 [[nodiscard]] std::vector<LineFound> probe_lines(const config::Configuration& configuration);

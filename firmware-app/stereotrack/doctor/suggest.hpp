@@ -10,10 +10,10 @@
 namespace stereotrack::doctor {
 
 /// Sets source and camera keys to the cameras that fit best: two of the same driver and kind that have a format and
-/// size in common, else one, in mono. Of formats the one that the driver calls cheapest; of sizes that of the
-/// configuration (camera.width, camera.height), else the largest below it, else the smallest; of rates the fastest up
-/// to camera.fps. Names are those that stay the same after a restart, where there are any. False: there is no camera to
-/// use.
+/// size in common, the kernel's before libcamera's, else one, in mono. Of formats the one that the driver calls
+/// cheapest; of sizes that of the configuration (camera.width, camera.height), else the largest below it, else the
+/// smallest; of rates the fastest up to camera.fps. Names are those that stay the same after a restart, where there are
+/// any. False: there is no camera to use.
 [[nodiscard]] bool choose_cameras(const std::vector<CameraFound>& cameras, config::Configuration& configuration);
 
 /// The configuration for this board as TOML, with what was measured in comments. `calibration`: its file; without one
