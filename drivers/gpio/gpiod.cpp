@@ -53,16 +53,23 @@ struct Chips {
   std::string closed;  ///< why the first that did not open did not; empty: all did
 };
 
-Chips chips_in_dev() {
+/// By number: /dev/gpiochip2 before /dev/gpiochip10.
+std::vector<std::string> chip_paths() {
   std::vector<std::string> paths;
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator("/dev", ignored)) {
     if (!entry.path().filename().string().starts_with("gpiochip") || entry.is_symlink(ignored)) continue;
     paths.push_back(entry.path().string());
   }
-  std::sort(paths.begin(), paths.end());
+  std::sort(paths.begin(), paths.end(), [](const std::string& a, const std::string& b) {
+    return a.size() != b.size() ? a.size() < b.size() : a < b;
+  });
+  return paths;
+}
+
+Chips chips_in_dev() {
   Chips chips;
-  for (const std::string& path : paths) {
+  for (const std::string& path : chip_paths()) {
     if (const auto chip = Chip::open(path)) {
       chips.facts.push_back(chip->facts());
     } else if (chips.closed.empty()) {
@@ -157,6 +164,21 @@ std::unique_ptr<InputRequest> request_inputs(const std::string& path, std::span<
     }
   }
   refuse(lines.front().spec.name, request_refusal(path, lines.front().offset, error, unfit));
+}
+
+std::vector<ChipListing> list_chips() {
+  std::vector<ChipListing> listings;
+  for (const std::string& path : chip_paths()) {
+    ChipListing& listing = listings.emplace_back();
+    listing.chip.path = path;
+    if (const auto chip = Chip::open(path)) {
+      listing.chip = chip->facts();
+      listing.lines = lines_of(*chip);
+    } else {
+      listing.problem = open_refusal(path, errno);
+    }
+  }
+  return listings;
 }
 
 }  // namespace stereotrack::gpio::gpiod

@@ -4,7 +4,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "drivers/gpio/choice.hpp"
 #include "drivers/gpio/input_lines.hpp"
 #include "drivers/gpio/line.hpp"
 
@@ -28,6 +30,16 @@ struct Found {
 /// The same for inputs with their edges.
 [[nodiscard]] std::unique_ptr<InputRequest> request_inputs(const std::string& path, std::span<const WantedInput> lines,
                                                            std::string_view consumer);
+
+/// A chip and what it says of its lines, for people.
+struct ChipListing {
+  ChipFacts chip;                ///< its path alone where there is a problem
+  std::vector<LineFacts> lines;  ///< by offset
+  std::string problem;           ///< why it could not be asked, with the way out; empty: it could
+};
+/// All GPIO chips in /dev, by number, and those that could not be asked; in a build without libgpiod none. Requests
+/// nothing: no line changes.
+[[nodiscard]] std::vector<ChipListing> list_chips();
 
 /// The interface of libgpiod that this build speaks: "1", "2", "none".
 [[nodiscard]] std::string_view interface() noexcept;

@@ -25,6 +25,8 @@ std::unique_ptr<InputRequest> request_inputs(const std::string& /*path*/, std::s
   refuse(lines.empty() ? LineName{} : lines.front().spec.name);
 }
 
+std::vector<ChipListing> list_chips() { return {}; }
+
 std::string_view interface() noexcept { return "none"; }
 
 }  // namespace stereotrack::gpio::gpiod

@@ -9,6 +9,7 @@
 #include "drivers/telemetry/endpoint.hpp"
 #include "drivers/telemetry/replay_guard.hpp"
 #include "firmware-app/stereotrack/disparity.hpp"
+#include "firmware-app/stereotrack/doctor/doctor.hpp"
 #include "firmware-app/stereotrack/eval.hpp"
 #include "firmware-app/stereotrack/monitor.hpp"
 #include "firmware-app/stereotrack/replay.hpp"
@@ -102,6 +103,11 @@ int run(int argc, char** argv) {
   monitor_command->add_option("--state", monitor.state, "file that keeps what was seen: no replays after a restart")
       ->needs(key_file);
 
+  stereotrack::DoctorArguments doctor;
+  CLI::App* doctor_command =
+      app.add_subcommand("doctor", "tells what this board has and can keep, and suggests a configuration");
+  stereotrack::add_options(*doctor_command, doctor);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -126,6 +132,7 @@ int run(int argc, char** argv) {
     return stereotrack::run_disparity(disparity, stereotrack::load_configuration(disparity_config, disparity_set),
                                       std::cerr);
   }
+  if (*doctor_command) return stereotrack::run_doctor(doctor, std::cout, std::cerr);
   monitor.live = isatty(STDOUT_FILENO) == 1;
   return stereotrack::run_monitor(monitor, std::cout, std::cerr);
 }

@@ -3,6 +3,7 @@
 
     test_readme.py PROJECT BIN      BIN: folder that holds the built programs
 """
+import json
 import os
 import pathlib
 import re
@@ -88,6 +89,21 @@ class Pages(unittest.TestCase):
                 if key.split(".")[0] in sections and not key.endswith((".csv", ".json", ".toml", ".yml", ".bin")):
                     with self.subTest(page=page.name, key=key):
                         self.assertIn(key, keys)
+
+    def test_keys_of_the_doctor_exist(self):
+        page = (PROJECT / "docs/DOCTOR.md").read_text()
+        told = json.loads(run(["stereotrack", "doctor", "--no-measure", "--json"]).stdout)
+        keys = re.findall(r"`([a-z_]+(?:\.[a-z_]+)*)`", "\n".join(re.findall(r"^\| (`[^|]*`) \|", page, re.M)))
+        self.assertGreater(len(keys), 15)
+        for path in keys:
+            value = told
+            for key in path.split("."):
+                value = value[0] if isinstance(value, list) and value else value
+                if not value and key not in (value or {}):
+                    break  # nothing of the kind here, or not measured
+                with self.subTest(key=path):
+                    self.assertIn(key, value)
+                value = value[key]
 
 
 if __name__ == "__main__":

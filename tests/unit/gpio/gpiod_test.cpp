@@ -43,6 +43,18 @@ TEST(Gpiod, RequestOfAChipThatWentIsRefused) {
   EXPECT_EQ(told, "GPIO line gpiochip77:3: /dev/gpiochip77 cannot be opened: No such file or directory");
 }
 
+// Also where there are none: each is asked, or says why it could not be.
+TEST(Gpiod, EveryChipIsListedOnce) {
+  std::size_t nodes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev")) {
+    nodes += entry.path().filename().string().starts_with("gpiochip") && !entry.is_symlink() ? 1 : 0;
+  }
+  const std::vector<ChipListing> chips = list_chips();
+  EXPECT_EQ(chips.size(), nodes);
+  for (const ChipListing& chip : chips)
+    EXPECT_EQ(chip.problem.empty(), chip.lines.size() == chip.chip.lines) << chip.problem;
+}
+
 TEST(Gpiod, InputsAreRefusedAlike) {
   const WantedInput line{{.name = {"gpiochip77", "3"}}, 3};
   EXPECT_EQ(refusal_of([&] {

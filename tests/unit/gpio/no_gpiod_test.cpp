@@ -24,6 +24,8 @@ TEST(WithoutGpiod, AnInputOfARealChipIsRefusedAlike) {
             std::string::npos);
 }
 
+TEST(WithoutGpiod, NoChipIsListed) { EXPECT_TRUE(gpiod::list_chips().empty()); }
+
 TEST(WithoutGpiod, TheSimulatedChipWorks) {
   OutputLines lines = open_lines(std::vector{LineSpec{{"sim", "a"}, false, false}}, "test");
   lines.set(1, MonotonicTime{});

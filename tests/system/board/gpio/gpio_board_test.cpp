@@ -2,12 +2,14 @@
 // where the kernel says it, in sysfs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
+#include "drivers/gpio/gpiod.hpp"
 #include "drivers/gpio/line.hpp"
 #include "tests/unit/gpio/support.hpp"
 
@@ -55,6 +57,20 @@ TEST(GpioBoard, PathNameAndLabelAreTheSameLine) {
     EXPECT_EQ(lines.set(1, at(1)).changed, 1U);
     EXPECT_EQ(level(2), "1") << chip;
   }
+}
+
+TEST(GpioBoard, ChipsAreListedWithTheirLinesAndWhoHoldsThem) {
+  const OutputLines held = open_lines(std::vector<LineSpec>{rig("NEAR")}, "test");
+  const std::vector<gpiod::ChipListing> chips = gpiod::list_chips();
+  const auto found =
+      std::find_if(chips.begin(), chips.end(), [](const gpiod::ChipListing& one) { return one.chip.label == "rig"; });
+  ASSERT_NE(found, chips.end());
+  EXPECT_EQ(found->problem, "");
+  ASSERT_EQ(found->lines.size(), 8U);
+  EXPECT_EQ(found->lines[2].name, "NEAR");
+  EXPECT_EQ(found->lines[2].consumer, "test");
+  EXPECT_TRUE(found->lines[2].used);
+  EXPECT_FALSE(found->lines[3].used);
 }
 
 TEST(GpioBoard, ALineInUseIsRefusedWithItsHolder) {

@@ -1,0 +1,238 @@
+#include "firmware-app/stereotrack/doctor/doctor.hpp"
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <memory>
+#include <ostream>
+#include <stdexcept>
+
+#include "config/error.hpp"
+#include "drivers/capture/pixel_format_names.hpp"
+#include "drivers/gpio/line.hpp"
+#include "firmware-app/rig/cameras.hpp"
+#include "firmware-app/rig/rig.hpp"
+#include "firmware-app/stereotrack/doctor/judge.hpp"
+#include "firmware-app/stereotrack/doctor/measure.hpp"
+#include "firmware-app/stereotrack/doctor/probe.hpp"
+#include "firmware-app/stereotrack/doctor/report.hpp"
+#include "firmware-app/stereotrack/doctor/suggest.hpp"
+
+namespace stereotrack {
+
+namespace fs = std::filesystem;
+using namespace doctor;
+
+namespace {
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+std::chrono::nanoseconds span_of(double seconds) {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(seconds * 1e9));
+}
+
+bool is_stereo(const config::CameraConfig& camera) { return camera.side_by_side || !camera.right.device.empty(); }
+
+/// Reads it. Why it is none for such pictures; empty: it is one.
+std::string check_calibration(Rig& rig, const std::string& file, int width, int height) {
+  try {
+    read_calibration(file, {}, rig);
+    capture::SourceInfo info;
+    info.width = width;
+    info.height = height;
+    check_rig(rig, info);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return {};
+}
+
+class Doctor {
+ public:
+  Doctor(const DoctorArguments& arguments, std::ostream& messages) : arguments_(arguments), messages_(messages) {
+    f_.program = std::string("stereotrack ") + STEREOTRACK_VERSION;
+    f_.host = host_name();
+    f_.config = arguments.config.value_or("");
+    rig_.loaded = load_configuration(arguments.config, {});
+    f_.configuration = rig_.configuration();
+    if (arguments.line) check_line_name(*arguments.line);
+  }
+
+  void look() {
+    const fs::path& root = arguments_.root;
+    f_.kernel = probe_kernel(root);
+    f_.cpu = probe_cpu(root);
+    f_.memory = probe_memory(root);
+    f_.limits = probe_limits(root);
+    f_.pwm = probe_pwm(root);
+    f_.clocks = probe_clocks(root);
+    f_.missing = ask_rights(f_.configuration.realtime);
+    f_.gpio_interface = gpio::gpiod::interface();
+    f_.chips = gpio::gpiod::list_chips();
+    f_.lines = probe_lines(f_.configuration);
+    f_.found = probe_cameras();
+    if (arguments_.config) {
+      f_.cameras_wanted = f_.configuration.source.name == kCameras;
+      check_configuration();
+    } else {
+      suggest_cameras();
+    }
+  }
+
+  void measure() {
+    f_.seconds = arguments_.seconds;
+    const config::Configuration& c = f_.configuration;
+    const std::chrono::nanoseconds time = span_of(arguments_.seconds);
+    std::unique_ptr<runtime::RealTimeProcess> process;
+    if (c.realtime.mode != config::RealTimeMode::kOff) {
+      process = std::make_unique<runtime::RealTimeProcess>(
+          runtime::RealTimeProcess::Config{.deep_sleep = c.realtime.deep_sleep});
+    }
+    bool colour = capture::pixel_format_of(c.camera.format).has_value()
+                      ? has_colour(*capture::pixel_format_of(c.camera.format))
+                      : true;
+    if (has_cameras()) {
+      say("cameras");
+      std::vector<std::string> notes;
+      CaptureMeasures measures =
+          measure_capture(camera_opener(c.camera, [&notes](const std::string& note) { notes.push_back(note); }),
+                          !c.camera.right.device.empty(), c.realtime, time);
+      f_.capture = std::move(measures.cameras);
+      f_.pair = measures.pair;
+      for (CaptureMeasure& camera : f_.capture) {
+        if (!camera.delivers.empty()) colour = camera.colour;
+        // Once is enough.
+        std::erase(f_.configuration_problems, camera.failure);
+      }
+      f_.capture.front().notes = std::move(notes);
+    } else if (!f_.cameras_wanted) {
+      colour = true;  // scenes and recordings have it
+    }
+    if (arguments_.line) {
+      say(*arguments_.line);
+      f_.line = measure_line(*arguments_.line, c.realtime, time);
+    }
+    say("synthetic:eleven, which is drawn first");
+    ComputeMeasures measures = measure_compute(c, colour, time);
+    f_.pipeline = std::move(measures.pipeline);
+    f_.wake_up = std::move(measures.wake_up);
+    f_.latency = latency_of(f_);
+  }
+
+  [[nodiscard]] const Findings& findings() const { return f_; }
+  [[nodiscard]] bool has_cameras() const { return f_.cameras_wanted && !f_.configuration.camera.left.device.empty(); }
+
+ private:
+  void say(const std::string& what) { messages_ << "measuring: " << what << std::endl; }
+
+  static void check_line_name(const std::string& line) {
+    try {
+      (void)gpio::parse_line_name(line);
+    } catch (const std::runtime_error& error) {
+      throw config::Error(std::string("--line: ") + error.what());
+    }
+  }
+
+  /// What stereotrackd --config FILE --check-config looks at.
+  void check_configuration() {
+    const config::Configuration& c = f_.configuration;
+    if (!f_.cameras_wanted) return;
+    if (is_stereo(c.camera) && c.calibration.file.empty()) {
+      f_.configuration_problems.push_back(
+          config::error_at(rig_.loaded.origins, "calibration.file",
+                           "not set: two views need their calibration; or leave camera.right.device out for mono")
+              .what());
+    } else if (is_stereo(c.camera)) {
+      const int width = c.camera.width / (c.camera.side_by_side ? 2 : 1);
+      if (std::string what = check_calibration(rig_, c.calibration.file, width, c.camera.height); !what.empty()) {
+        f_.configuration_problems.push_back(std::move(what));
+      }
+    }
+    f_.has_calibration = rig_.calibration.has_value();
+    const CameraCheck check = check_cameras(rig_.loaded);
+    for (const std::string& failure : check.failures) f_.configuration_problems.push_back(failure);
+  }
+
+  /// Without a configuration: the cameras that there are, in the calibration's size where there is one.
+  void suggest_cameras() {
+    config::CameraConfig& camera = f_.configuration.camera;
+    if (arguments_.calibration) {
+      read_calibration(*arguments_.calibration, {}, rig_);
+      if (rig_.calibration && rig_.calibration->left.width > 0) {
+        camera.width = rig_.calibration->left.width;
+        camera.height = rig_.calibration->left.height;
+      }
+      f_.has_calibration = true;
+    }
+    f_.suggestion = choose_cameras(f_.found.cameras, f_.configuration);
+    if (!f_.suggestion || !arguments_.calibration || camera.right.device.empty()) return;
+    if (std::string what = check_calibration(rig_, *arguments_.calibration, camera.width, camera.height);
+        !what.empty()) {
+      f_.configuration_problems.push_back(std::move(what));
+    }
+  }
+
+  const DoctorArguments& arguments_;
+  std::ostream& messages_;
+  Rig rig_;
+  Findings f_;
+};
+
+}  // namespace
+
+void add_options(CLI::App& command, DoctorArguments& arguments) {
+  CLI::Option* config =
+      command.add_option("--config", arguments.config, "checks its cameras, lines and rights; else what there is");
+  CLI::Option* measure =
+      command.add_flag("!--no-measure", arguments.measure, "only looks: opens no camera but to check");
+  command.add_option("--seconds", arguments.seconds, "of each measurement")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str()
+      ->excludes(measure);
+  command
+      .add_option("--line", arguments.line,
+                  "CHIP:LINE: sets this output to and fro and tells how long that takes; no line is touched unasked")
+      ->excludes(measure);
+  command.add_flag("--json", arguments.json, "one JSON object, keys as in docs/DOCTOR.md");
+  command.add_option("--write", arguments.write, "writes a configuration for this board to a new file")
+      ->excludes(config);
+  command.add_option("--calibration", arguments.calibration, "calibration of the two cameras, for that configuration")
+      ->excludes(config);
+  command.footer("Exit code: 0 ready, 1 works with limits, which are named, 2 cannot run.");
+}
+
+int run_doctor(const DoctorArguments& arguments, std::ostream& out, std::ostream& messages) try {
+  std::error_code ignored;
+  if (arguments.write && fs::exists(*arguments.write, ignored)) {
+    throw config::Error(arguments.write->string() +
+                        ": is there already and stays as it is: give --write another name, or move it");
+  }
+  Doctor doctor(arguments, messages);
+  doctor.look();
+  if (arguments.measure) doctor.measure();
+  const Findings& findings = doctor.findings();
+  const std::vector<Item> items = judge(findings);
+  out << (arguments.json ? json(findings, items) : report(findings, items)) << std::flush;
+  if (arguments.write) {
+    if (!findings.suggestion) {
+      throw config::Error(arguments.write->string() + ": not written: there is no camera that can be used");
+    }
+    std::optional<std::string> calibration;
+    if (arguments.calibration) calibration = fs::absolute(*arguments.calibration).lexically_normal().string();
+    write_new_file(*arguments.write, suggest(findings, calibration));
+    messages << arguments.write->string() << ": written; now: stereotrackd --config " << arguments.write->string()
+             << " --check-config" << std::endl;
+  }
+  return exit_code(worst_of(items));
+} catch (const config::Error&) {
+  throw;
+} catch (const std::exception& error) {
+  // Exit code 1 would say that it works.
+  throw config::Error(error.what());
+}
+
+}  // namespace stereotrack
