@@ -11,6 +11,8 @@
  * Threads:  "owner"    open_manager to close_manager, all of a process by one thread at a time; may wait and allocate
  *           "capture"  from start() on, one thread a stream: takes no lock and no heap, never enters libcamera, makes a
  *                      system call at most, which does not wait
+ * Threads that a module or its libcamera starts block all signals but those of a fault: the others are the program's,
+ * which may not have blocked them yet.
  */
 
 #include <stdint.h>

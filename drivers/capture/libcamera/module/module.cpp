@@ -21,6 +21,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -65,6 +66,24 @@ Result guarded(char* why, Result failed, const Body& body) noexcept {
   }
   return failed;
 }
+
+/// Threads that libcamera and we start meanwhile take no signals, which are the program's, but those of a fault of
+/// their own.
+class WithoutSignals {
+ public:
+  WithoutSignals() noexcept {
+    sigset_t ours;
+    (void)sigfillset(&ours);
+    for (const int fault : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTRAP, SIGSYS}) (void)sigdelset(&ours, fault);
+    (void)pthread_sigmask(SIG_BLOCK, &ours, &before_);
+  }
+  WithoutSignals(const WithoutSignals&) = delete;
+  WithoutSignals& operator=(const WithoutSignals&) = delete;
+  ~WithoutSignals() { (void)pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+
+ private:
+  sigset_t before_{};
+};
 
 std::int64_t monotonic_now() noexcept {
   timespec now{};
@@ -410,6 +429,7 @@ namespace {
 const char* library() { return lc::CameraManager::version().c_str(); }
 
 LibcameraManager* open_manager(char* why) {
+  const WithoutSignals quiet;
   return guarded<LibcameraManager*>(why, nullptr, [&]() -> LibcameraManager* {
     auto manager = std::make_unique<LibcameraManager>();
     manager->nodes = lm::list_nodes();
@@ -494,6 +514,7 @@ std::int32_t format(LibcameraManager* manager, std::uint32_t camera, std::uint32
 
 std::int32_t open(LibcameraManager* manager, std::uint32_t camera, const LibcameraWish* wish, LibcameraSetup* setup,
                   LibcameraStream** stream, char* why) {
+  const WithoutSignals quiet;
   return guarded<std::int32_t>(why, kLibcameraFailed, [&]() -> std::int32_t {
     if (camera >= manager->cameras.size()) throw std::runtime_error("there is no such camera any more");
     const std::shared_ptr<lc::Camera> of = manager->cameras[camera];
@@ -537,6 +558,7 @@ std::int32_t plane(LibcameraStream* stream, std::uint32_t buffer, std::uint32_t 
 }
 
 std::int32_t start(LibcameraStream* stream, char* why) {
+  const WithoutSignals quiet;
   return guarded<std::int32_t>(why, 0, [&] {
     stream->start();
     return 1;
