@@ -13,7 +13,6 @@ namespace stereotrack::capture::v4l2::test {
 namespace {
 
 using ::testing::AllOf;
-using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -76,9 +75,8 @@ TEST_F(Faults, ADriverThatDoesNotStartIsNamedAndTheNextOpeningWorks) {
 
 TEST_F(Faults, ADriverThatGivesNoBuffersIsNamed) {
   Other(kLeft).set("Inject VIDIOC_REQBUFS Error");
-  const std::string line = refusal([&] { (void)started(settings()); });
-  EXPECT_THAT(line, AnyOf("", AllOf(HasSubstr("camera /dev/video0: gives no 8 buffers"), HasSubstr("errno 22"))));
-  std::printf("reqbufs: %s\n", line.c_str());
+  EXPECT_THAT(refusal([&] { (void)started(settings()); }),
+              AllOf(HasSubstr("camera /dev/video0: gives no 8 buffers"), HasSubstr("errno 22")));
   expect_works();
 }
 

@@ -56,9 +56,10 @@ gtest() {
 
 eventually() {
   local tries
-  for ((tries = 0; tries < 200; tries++)); do
+  # Asking costs the host time, waiting does not.
+  for ((tries = 0; tries < 80; tries++)); do
     if "$@" >/dev/null 2>&1; then return 0; fi
-    sleep 0.1
+    sleep 0.25
   done
   "$@"
 }

@@ -29,7 +29,8 @@ four_edges() {
 
 fact "what is driven is read in sysfs" value_while_set
 fact "edges arrive in their order" four_edges
-gtest gpio_test
+# Two threads that spin against each other take turns here, which costs minutes and shows nothing of a chip.
+gtest gpio_test --gtest_filter=-OutputLines.AChipGoesAndComesWhileItIsDriven
 fact "edges of a line that drives another come once each, in order, also of a chip that comes back" \
   ./gpio_lines_check rig 5 6 /sys/devices/platform/gpio-sim.0 $rig
 # The chip came back, maybe by another number.
