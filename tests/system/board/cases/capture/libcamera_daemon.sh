@@ -4,7 +4,7 @@
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
-export STEREOTRACK_MODULE_PATH=/payload LIBCAMERA_LOG_LEVELS='*:WARN'
+export STEREOTRACK_MODULE_PATH=/payload LIBCAMERA_LOG_LEVELS='*:ERROR'
 
 cat >/run/rig.toml <<END
 [source]
@@ -40,7 +40,7 @@ matrix() { printf '%s: !!opencv-matrix\n   rows: %d\n   cols: %d\n   dt: d\n   d
 
 start() {
   systemd-run --unit=stereotrackd --property=Type=notify --property=StateDirectory=stereotrack \
-    --setenv=STEREOTRACK_MODULE_PATH=/payload --setenv=LIBCAMERA_LOG_LEVELS='*:WARN' \
+    --setenv=STEREOTRACK_MODULE_PATH=/payload --setenv=LIBCAMERA_LOG_LEVELS='*:ERROR' \
     /payload/stereotrackd --config /run/rig.toml
 }
 figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
