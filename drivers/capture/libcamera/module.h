@@ -142,7 +142,8 @@ typedef struct LibcameraModule {
   int32_t (*start)(LibcameraStream* stream, char* why);
   /* Whatever state it is in; no other thread is in it. Of a camera that was unplugged, libcamera's part stays behind. */
   void (*close)(LibcameraStream* stream);
-  /* After kLibcameraLost: what happened, such as "was unplugged". Lives as long as the stream. */
+  /* After kLibcameraLost: what the camera did, and the way out, such as "was unplugged: check its plug and power". Lives
+     as long as the stream. */
   const char* (*loss)(LibcameraStream* stream);
 
   /* ---- Capture */

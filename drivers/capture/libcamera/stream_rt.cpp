@@ -24,7 +24,7 @@ Camera::Take Stream::take(SensorFrame& frame) noexcept {
     case kLibcameraTaken: break;
     default: return lose(module_->loss(parts_.stream.get()));
   }
-  if (told.buffer >= parts_.info.buffers) return lose("its module names a buffer that there is not");
+  if (told.buffer >= parts_.info.buffers) return lose("has a buffer that there is not: build its module anew");
 
   frame.settings = {};
   // What the camera was told stays in force where libcamera does not tell.

@@ -237,7 +237,7 @@ static int32_t start(LibcameraStream* s, char* why) {
 
 static const char* loss(LibcameraStream* s) {
   (void)s;
-  return "was unplugged";
+  return "was unplugged: check its plug and power";
 }
 
 static int32_t take(LibcameraStream* s, LibcameraFrame* frame) {

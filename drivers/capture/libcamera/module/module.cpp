@@ -353,7 +353,7 @@ struct LibcameraStream {
   void completed(lc::Request* request) noexcept {
     if (ending_.load(std::memory_order_relaxed)) return;
     if (request->status() == lc::Request::RequestCancelled) {
-      handover_.lose("libcamera has cancelled its requests");
+      handover_.lose("had its requests cancelled: check its cable, dmesg tells more");
       return;
     }
     LibcameraFrame frame{};
@@ -386,7 +386,7 @@ struct LibcameraStream {
     handover_.push(frame);
   }
 
-  void disconnected() noexcept { handover_.lose("was unplugged"); }
+  void disconnected() noexcept { handover_.lose("was unplugged: check its plug and power"); }
 
   // ---- Queueing thread
 
@@ -400,7 +400,7 @@ struct LibcameraStream {
         request.reuse(lc::Request::ReuseBuffers);
         return camera_->queueRequest(&request) == 0;
       });
-      if (!queued) handover_.lose("does not take its buffers back");
+      if (!queued) handover_.lose("does not take its buffers back: dmesg tells more");
     }
   }
 
@@ -460,7 +460,8 @@ std::int32_t renew(LibcameraManager* manager) {
   return guarded<std::int32_t>(nullptr, 0, [&] {
     if (!lm::are_there_others(manager->nodes)) return 0;
     for (LibcameraStream* const stream : manager->streams) {
-      stream->handover().lose("has to be opened anew, for libcamera has to look for devices that were plugged in");
+      stream->handover().lose(
+          "has to be opened anew, so that libcamera looks for devices that were plugged in: it comes back by itself");
     }
     return 1;
   });
