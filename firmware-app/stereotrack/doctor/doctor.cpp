@@ -97,18 +97,23 @@ class Doctor {
                       : true;
     if (has_cameras()) {
       say("cameras");
-      std::vector<std::string> notes;
-      CaptureMeasures measures =
-          measure_capture(camera_opener(c.camera, [&notes](const std::string& note) { notes.push_back(note); }),
-                          !c.camera.right.device.empty(), c.realtime, time);
+      std::array<std::vector<std::string>, 2> notes;
+      std::size_t side_opened = 0;
+      const auto open = camera_opener(c.camera, [&](const std::string& note) { notes[side_opened].push_back(note); });
+      CaptureMeasures measures = measure_capture(
+          [&](trigger::Side side) {
+            side_opened = side == trigger::Side::kLeft ? 0 : 1;
+            return open(side);
+          },
+          !c.camera.right.device.empty(), c.realtime, time);
       f_.capture = std::move(measures.cameras);
+      for (std::size_t i = 0; i < f_.capture.size(); ++i) f_.capture[i].notes = std::move(notes[i]);
       f_.pair = measures.pair;
       for (CaptureMeasure& camera : f_.capture) {
         if (!camera.delivers.empty()) colour = camera.colour;
         // Once is enough.
         std::erase(f_.configuration_problems, camera.failure);
       }
-      f_.capture.front().notes = std::move(notes);
     } else if (!f_.cameras_wanted) {
       colour = true;  // scenes and recordings have it
     }

@@ -152,9 +152,9 @@ class Judge {
     if (slow) {
       note("clock", c.source + ": slow to read",
            better != nullptr ? "take the better one" : "see why the kernel chose it",
-           better != nullptr ? "echo " + std::string(better) +
-                                   " | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource"
-                             : "sudo dmesg | grep -i clocksource");
+           better != nullptr
+               ? "echo " + std::string(better) + " | sudo tee /sys/devices/system/clocksource/*/current_clocksource"
+               : "sudo dmesg | grep -i clocksource");
     }
     std::string what = c.source.empty() ? "source not told" : c.source;
     if (!c.ptp.empty()) what += ", " + joined(c.ptp, " ");

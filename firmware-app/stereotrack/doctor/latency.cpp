@@ -29,7 +29,8 @@ Tail tail_of(std::vector<std::int64_t> values_ns) {
 }
 
 /// A result leaves at the middle of its exposure + L. Until then
-///     arrival   frames come, of both cameras: p99.9; with the phase, where the right one exposes later. Not measured:
+///     arrival   frames come, of both cameras: p99.9; with the phase, where the right one exposes later, and as if no
+///               stamp were after its arrival. Not measured:
 ///               a period, which reading out takes at most. A film's pairs: nothing
 ///     wake      the frame loop and the publisher are woken: p99.9, twice
 ///     compute   the pipeline: p99.9 on synthetic:eleven
@@ -47,7 +48,9 @@ std::optional<LatencyVerdict> latency_of(const Findings& findings) {
     verdict.arrival_is_assumed = false;
     const double later_ms =
         camera.side == "right" && findings.pair ? std::max(0.0, findings.pair->phase_ms.value_or(0)) : 0;
-    arrival_us = std::max(arrival_us, camera.delay.p999_us + later_ms * 1e3);
+    // Stamps after the arrival are set right by camera.readout_us, which then moves all of them.
+    const double early_us = std::max(0.0, -camera.delay_min_us);
+    arrival_us = std::max(arrival_us, camera.delay.p999_us + early_us + later_ms * 1e3);
   }
   verdict.arrival_ms = verdict.arrival_is_assumed ? verdict.period_ms : arrival_us * 1e-3;
   verdict.compute_ms = findings.pipeline->compute.p999_us * 1e-3;

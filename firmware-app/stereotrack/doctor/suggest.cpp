@@ -99,14 +99,26 @@ std::optional<Delivery> common(const std::vector<const CameraFacts*>& cameras,
   return std::nullopt;
 }
 
-/// The name that stays: by the place where it is plugged in.
-std::string lasting_name(const CameraFacts& camera, const std::vector<const CameraFacts*>& all) {
+std::string path_link(const CameraFacts& camera) {
   for (const std::string& link : camera.links) {
     if (link.find("/by-path/") != std::string::npos) return link;
   }
-  const auto same_bus =
-      std::count_if(all.begin(), all.end(), [&](const CameraFacts* c) { return c->bus == camera.bus; });
-  return same_bus == 1 && !camera.bus.empty() ? "bus:" + camera.bus : camera.path;
+  return {};
+}
+
+/// Names that stay, by the places where they are plugged in. The link of one alone is no such name: two nodes of one
+/// place ask udev for the same, and who gets it may change.
+std::vector<std::string> lasting_names(const std::vector<const CameraFacts*>& cameras,
+                                       const std::vector<const CameraFacts*>& all) {
+  std::vector<std::string> names;
+  for (const CameraFacts* const camera : cameras) names.push_back(path_link(*camera));
+  if (std::none_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); })) return names;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::string& bus = cameras[i]->bus;
+    const auto same = std::count_if(all.begin(), all.end(), [&bus](const CameraFacts* c) { return c->bus == bus; });
+    names[i] = same == 1 && !bus.empty() ? "bus:" + bus : cameras[i]->path;
+  }
+  return names;
 }
 
 void apply(const Delivery& delivery, config::CameraConfig& camera) {
@@ -148,7 +160,12 @@ bool choose_of(const std::vector<CameraFound>& cameras, config::CameraDriver dri
   for (const CameraFound& camera : cameras) {
     if (camera.driver == driver && camera.facts.problem.empty()) all.push_back(&camera.facts);
   }
-  const auto name_of = [&](const CameraFacts& camera) { return of_kernel ? lasting_name(camera, all) : camera.path; };
+  const auto names_of = [&](const std::vector<const CameraFacts*>& chosen_ones) {
+    if (of_kernel) return lasting_names(chosen_ones, all);
+    std::vector<std::string> ids;
+    for (const CameraFacts* const camera : chosen_ones) ids.push_back(camera->path);
+    return ids;
+  };
   const std::vector<std::string_view> formats =
       of_kernel ? capture::v4l2::format_names() : capture::libcamera::format_names();
   // Two of one kind first, then two of one driver. The kernel's nodes on one bus are one camera's.
@@ -163,8 +180,9 @@ bool choose_of(const std::vector<CameraFound>& cameras, config::CameraDriver dri
         const auto delivery = common({&left, &right}, formats, chosen);
         if (!delivery) continue;
         apply(*delivery, chosen);
-        chosen.left.device = name_of(left);
-        chosen.right.device = name_of(right);
+        const std::vector<std::string> names = names_of({&left, &right});
+        chosen.left.device = names[0];
+        chosen.right.device = names[1];
         return true;
       }
     }
@@ -173,7 +191,7 @@ bool choose_of(const std::vector<CameraFound>& cameras, config::CameraDriver dri
     const auto delivery = common({camera}, formats, chosen);
     if (!delivery) continue;
     apply(*delivery, chosen);
-    chosen.left.device = name_of(*camera);
+    chosen.left.device = names_of({camera}).front();
     chosen.right.device.clear();
     return true;
   }

@@ -181,6 +181,12 @@ TEST(Latency, IsTheSumOfWhatWasMeasuredRoundedUp) {
   EXPECT_DOUBLE_EQ(verdict->achievable_ms, 28);
   EXPECT_FALSE(verdict->arrival_is_assumed);
 
+  // Stamped 13 ms too late at most: what was 2 ms before its arrival takes 11.
+  f.capture.pop_back();
+  f.capture[0].delay = {1000, -12'500, -3'000, -2'000, -1'000};
+  f.capture[0].delay_min_us = -13'000;
+  EXPECT_DOUBLE_EQ(latency_of(f)->arrival_ms, 11);
+
   f.capture.clear();
   EXPECT_TRUE(latency_of(f)->arrival_is_assumed);
   EXPECT_DOUBLE_EQ(latency_of(f)->arrival_ms, 33);

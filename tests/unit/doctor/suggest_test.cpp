@@ -55,9 +55,13 @@ TEST(ChooseCameras, APlaceThatLastsIsTheName) {
   std::vector<CameraFound> cameras{camera_at(0, "unicam", "unicam", "platform:a", kGrey),
                                    camera_at(1, "unicam", "unicam", "platform:b", kGrey)};
   cameras[0].facts.links = {"/dev/v4l/by-id/usb-Eye", "/dev/v4l/by-path/platform-a-video-index0"};
-  const auto c = chosen_of(cameras);
-  EXPECT_EQ(c.camera.left.device, "/dev/v4l/by-path/platform-a-video-index0");
-  EXPECT_EQ(c.camera.right.device, "bus:platform:b");
+  cameras[1].facts.links = {"/dev/v4l/by-path/platform-b-video-index0"};
+  EXPECT_EQ(chosen_of(cameras).camera.left.device, "/dev/v4l/by-path/platform-a-video-index0");
+  EXPECT_EQ(chosen_of(cameras).camera.right.device, "/dev/v4l/by-path/platform-b-video-index0");
+  // Of one alone it may be the other's tomorrow.
+  cameras[1].facts.links.clear();
+  EXPECT_EQ(chosen_of(cameras).camera.left.device, "bus:platform:a");
+  EXPECT_EQ(chosen_of(cameras).camera.right.device, "bus:platform:b");
 }
 
 TEST(ChooseCameras, SizeFormatAndRateAreWhatBothHave) {
