@@ -169,6 +169,7 @@ class Judge {
 
   void gpio() {
     std::vector<std::string> chips;
+    chips.reserve(f_.chips.size());
     for (const gpio::gpiod::ChipListing& chip : f_.chips) {
       if (!chip.problem.empty()) {
         note("gpio", chip.problem, {}, {});
@@ -205,6 +206,7 @@ class Judge {
 
   void pwm() {
     std::vector<std::string> chips;
+    chips.reserve(f_.pwm.size());
     for (const PwmChip& chip : f_.pwm) {
       chips.push_back(chip.name + " (" + joined({chip.device, count_text(chip.channels, "channel")}, ", ") +
                       (chip.exported.empty() ? "" : ", " + std::to_string(chip.exported.size()) + " in use") + ")");

@@ -29,6 +29,7 @@ LineFound look_up(std::string key, const std::string& line, bool output,
 std::vector<LineFound> probe_lines(const config::Configuration& configuration) {
   std::vector<LineFound> lines;
   const std::vector<gpio::gpiod::ChipListing> chips = gpio::gpiod::list_chips();
+  lines.reserve(configuration.signals.size() + configuration.inputs.size());
   for (const config::SignalConfig& signal : configuration.signals) {
     lines.push_back(look_up("signal " + signal.name, signal.line, true, chips));
   }

@@ -111,6 +111,7 @@ std::string path_link(const CameraFacts& camera) {
 std::vector<std::string> lasting_names(const std::vector<const CameraFacts*>& cameras,
                                        const std::vector<const CameraFacts*>& all) {
   std::vector<std::string> names;
+  names.reserve(cameras.size());
   for (const CameraFacts* const camera : cameras) names.push_back(path_link(*camera));
   if (std::none_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); })) return names;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -163,6 +164,7 @@ bool choose_of(const std::vector<CameraFound>& cameras, config::CameraDriver dri
   const auto names_of = [&](const std::vector<const CameraFacts*>& chosen_ones) {
     if (of_kernel) return lasting_names(chosen_ones, all);
     std::vector<std::string> ids;
+    ids.reserve(chosen_ones.size());
     for (const CameraFacts* const camera : chosen_ones) ids.push_back(camera->path);
     return ids;
   };

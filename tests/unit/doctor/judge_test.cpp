@@ -202,6 +202,7 @@ TEST(TailOf, NoneOneAndAThousand) {
   EXPECT_DOUBLE_EQ(one.p50_us, -2);
   EXPECT_DOUBLE_EQ(one.p999_us, -2);
   std::vector<std::int64_t> values;
+  values.reserve(1000);
   for (int i = 1000; i >= 1; --i) values.push_back(i * 1000);
   const Tail all = tail_of(values);
   EXPECT_DOUBLE_EQ(all.p50_us, 500);
