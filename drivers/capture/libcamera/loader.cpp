@@ -35,6 +35,8 @@ std::string last_error() {
 
 /// Its table, or why it does not fit.
 const LibcameraModule* try_module(const fs::path& path, std::string& problem) {
+  // libcamera reads this as it is loaded, and else tells each start at length, past our log.
+  (void)::setenv("LIBCAMERA_LOG_LEVELS", "*:ERROR", 0);
   // Its libcamera's symbols are for it alone: another module may come with another one.
   void* const handle = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) {

@@ -376,7 +376,8 @@ def write_junit(cases, path):
 
 def run_case(case, args, results):
     build = pathlib.Path(args.build)
-    things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh"}
+    things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh",
+              ".board/daemon.sh": HERE / "guest/daemon.sh"}
     things.update({pathlib.Path(want).name: build / want for want in case.wants})
     things.update({f".board/project/{path}": PROJECT / path for path in case.brings})
     start = (f"mkdir -p {shlex.quote(str(PROJECT.parent))}\n"

@@ -4,6 +4,8 @@
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
+# shellcheck source=tests/system/board/guest/daemon.sh
+source /payload/.board/daemon.sh
 
 cat >/run/rig.toml <<END
 [source]
@@ -27,17 +29,6 @@ output_ms = 150.0
 file = "/run/results/figures.prom"
 END
 
-start() {
-  systemd-run --unit=stereotrackd --property=Type=notify --property=StateDirectory=stereotrack \
-    /payload/stereotrackd --config /run/rig.toml
-}
-figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
-over() { (($(figure "$1") > $2)); }
-rises() {
-  local before
-  before=$(figure "$1") && eventually over "$1" "$before"
-}
-says() { journalctl -u stereotrackd -o cat | grep -E "$1"; }
 # Both cameras are one platform device.
 unplug() { echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind; }
 plug_in() { echo vivid.0 >/sys/bus/platform/drivers/vivid/bind; }
@@ -46,7 +37,7 @@ paired='stereotrack_pairing_total{verdict="paired"}'
 
 fact "a scene of that size brings a calibration" \
   /payload/stereotrack synth eleven --out /run/scene --frames 1 --size 320x180
-fact "both cameras can do what is asked of them" /payload/stereotrackd --config /run/rig.toml --check-config
+fact "both cameras can do what is asked of them" check
 fact "it starts on both" start
 fact "pairs come" eventually over "$paired" 5
 fact "and leave on time" eventually over 'stereotrack_outputs_total{cause="on_time"}' 5
@@ -68,7 +59,7 @@ fact "pairs come for the third time" rises "$paired"
 fact "a fatal error of the stream is a camera lost" v4l2-ctl -d1 -c inject_fatal_streaming_error=1
 fact "which is opened anew" eventually over 'stereotrack_camera_reopened_total{camera="right"}' 2
 fact "and pairs come for the fourth" rises "$paired"
-fact "it is the process that was started" test "$(systemctl show stereotrackd -p NRestarts --value)" = 0
+fact "it is the process that was started" test "$(property NRestarts)" = 0
 grep -E '^stereotrack_(camera|pairing|mono|outputs|frames)' /run/results/figures.prom | tell
 
 fact "it ends when it is asked to" systemctl stop stereotrackd

@@ -5,6 +5,8 @@
 # limit: 900
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
+# shellcheck source=tests/system/board/guest/daemon.sh
+source /payload/.board/daemon.sh
 
 # LEFT_DEVICE RIGHT_DEVICE
 write_config() {
@@ -30,21 +32,6 @@ output_ms = 150.0
 file = "/run/results/figures.prom"
 END
 }
-start() {
-  rm -f /run/results/figures.prom
-  systemd-run --unit="$unit" --property=Type=notify --property=StateDirectory=stereotrack \
-    /payload/stereotrackd --config /run/rig.toml
-}
-stop() { systemctl stop "$unit" && [[ -z $(systemctl --failed --no-legend) ]]; }
-figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
-is() { [[ $(figure "$1") == "$2" ]] || { echo "$1 is $(figure "$1"), not $2"; return 1; }; }
-over() { (($(figure "$1") > $2)) || { echo "$1 is $(figure "$1"), not over $2"; return 1; }; }
-at_most() { (($(figure "$1") <= $2)) || { echo "$1 is $(figure "$1"), over $2"; return 1; }; }
-rises() {
-  local before
-  before=$(figure "$1") && eventually over "$1" $((before + ${2:-0}))
-}
-says() { journalctl -u "$unit" -o cat | grep -E "$1"; }
 set_control() { v4l2-ctl -d "$1" -c "$2"; }
 of() { echo "stereotrack_camera_$1{camera=\"$2\"${3:+,fate=\"$3\"}}"; }
 paired='stereotrack_pairing_total{verdict="paired"}'
@@ -56,6 +43,7 @@ missing_right='stereotrack_pairing_total{verdict="missing_right"}'
 # ---- Cameras that are not there when the daemon starts: none, then the left one, then the right one.
 unit=none
 write_config /run/left /run/right
+# shellcheck disable=SC2119  # no options
 refused() { ! start 2>/dev/null; }
 fact "without any camera it does not start" refused
 fact "and names the first, and those there are" says 'camera /run/left: is not there: plug it in.*there is /dev/video0'
@@ -137,7 +125,7 @@ for call in streamon reqbufs qbuf; do
 done
 grep -E '^stereotrack_(camera|pairing|mono|outputs)' /run/results/figures.prom | tell
 fact "the capture thread asked the heap for nothing" is 'stereotrack_allocations_total{thread="capture"}' 0
-fact "it was one process" test "$(systemctl show "$unit" -p NRestarts --value)" = 0
+fact "it was one process" test "$(property NRestarts)" = 0
 fact "the daemon ends after all that" stop
 
 # ---- Counts and stamps that come round while it runs: after 128 frames, and after 16 s.

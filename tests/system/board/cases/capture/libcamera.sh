@@ -4,7 +4,7 @@
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
-export STEREOTRACK_MODULE_PATH=/payload LIBCAMERA_LOG_LEVELS='*:ERROR'
+export STEREOTRACK_MODULE_PATH=/payload
 gtest libcamera_board_test
 grep '^# ' /run/results/libcamera_board_test.log
 finish

@@ -4,7 +4,9 @@
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
-export STEREOTRACK_MODULE_PATH=/payload LIBCAMERA_LOG_LEVELS='*:ERROR'
+# shellcheck source=tests/system/board/guest/daemon.sh
+source /payload/.board/daemon.sh
+export STEREOTRACK_MODULE_PATH=/payload
 
 cat >/run/rig.toml <<END
 [source]
@@ -38,15 +40,6 @@ matrix() { printf '%s: !!opencv-matrix\n   rows: %d\n   cols: %d\n   dt: d\n   d
   matrix T 3 1 "-0.25, 0, 0"
 } >/run/calibration.yml
 
-start() {
-  systemd-run --unit=stereotrackd --property=Type=notify --property=StateDirectory=stereotrack \
-    --setenv=STEREOTRACK_MODULE_PATH=/payload --setenv=LIBCAMERA_LOG_LEVELS='*:ERROR' \
-    /payload/stereotrackd --config /run/rig.toml
-}
-figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
-over() { (($(figure "$1") > $2)); }
-says() { journalctl -u stereotrackd -o cat | grep -E "$1"; }
-check() { /payload/stereotrackd --config /run/rig.toml --check-config; }
 # Without a module: the line says why, and how to go on.
 refuses_without_a_module() {
   local said
@@ -62,10 +55,6 @@ v4l2_starts_without() {
     --set camera.driver=v4l2 --set camera.left.device=/dev/video0 --set camera.right.device= --set calibration.file= \
     --set camera.width=320 --set camera.format=grey8
 }
-rises() {
-  local before
-  before=$(figure "$1") && eventually over "$1" "$before"
-}
 plug_in() { echo vimc.1 >/sys/bus/platform/drivers/vimc/bind; }
 unplug() { echo vimc.1 >/sys/bus/platform/drivers/vimc/unbind; }
 paired='stereotrack_pairing_total{verdict="paired"}'
@@ -75,7 +64,7 @@ fact "and cameras of the kernel's are opened all the same" v4l2_starts_without
 fact "both cameras can do what is asked of them" check
 check 2>&1 | tell
 
-fact "the daemon starts on both" start
+fact "the daemon starts on both" start --setenv=STEREOTRACK_MODULE_PATH=/payload
 fact "pairs come" eventually over "$paired" 5
 fact "the capture thread asked the heap for nothing" test "$(figure 'stereotrack_allocations_total{thread="capture"}')" = 0
 fact "the right camera is unplugged" unplug
@@ -86,7 +75,7 @@ fact "it is plugged in again" plug_in
 fact "both are opened anew, for libcamera has to look again" eventually over 'stereotrack_camera_reopened_total{camera="left"}' 0
 fact "and pairs come again" rises "$paired"
 grep -E '^stereotrack_(camera|pairing|mono|outputs|frames)' /run/results/figures.prom | tell
-fact "it is the process that was started" test "$(systemctl show stereotrackd -p NRestarts --value)" = 0
+fact "it is the process that was started" test "$(property NRestarts)" = 0
 fact "it ends when it is asked to" systemctl stop stereotrackd
 fact "without a failure" test -z "$(systemctl --failed --no-legend)"
 journalctl -u stereotrackd -o cat | tell

@@ -14,6 +14,8 @@
 # limit: 600
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
+# shellcheck source=tests/system/board/guest/daemon.sh
+source /payload/.board/daemon.sh
 
 pairs=60
 cat >/run/rig.toml <<END
@@ -49,16 +51,6 @@ END
 mkdir /run/recordings
 mkfifo /run/go
 
-start() {
-  systemd-run --unit=stereotrackd --property=Type=notify --property=StateDirectory=stereotrack \
-    /payload/stereotrackd --config /run/rig.toml
-}
-figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
-is() { [[ $(figure "$1") == "$2" ]] || { echo "$1 is $(figure "$1"), not $2"; return 1; }; }
-none() {
-  local name
-  for name in "$@"; do is "$name" 0 || return; done
-}
 replay() { /payload/stereotrack replay "$@"; }
 compared() {
   ./keep_telemetry compare /run/live.bin /run/replayed/telemetry.bin >/run/compared.txt && return

@@ -6,6 +6,8 @@
 # shellcheck disable=SC2016  # what stands in single quotes is Perl, whose variables are its own
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
+# shellcheck source=tests/system/board/guest/daemon.sh
+source /payload/.board/daemon.sh
 
 report=/run/results/report.txt
 json=/run/results/doctor.json
@@ -32,8 +34,6 @@ measures() {
 }
 sets_a_line() { /payload/stereotrack doctor --config /run/lines.toml --seconds 1 --line rig:NEAR --json >$line_json; }
 is_low() { [[ $(cat /run/rig/sim_gpio2/value) == 0 ]]; }
-figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
-over() { (($(figure "$1") > $2)); }
 start() {
   systemd-run --unit=stereotrackd --property=Type=notify --property=StateDirectory=stereotrack \
     /payload/stereotrackd --config /run/rig.toml --set metrics.file=/run/results/figures.prom

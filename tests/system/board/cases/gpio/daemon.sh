@@ -5,6 +5,8 @@
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
+# shellcheck source=tests/system/board/guest/daemon.sh
+source /payload/.board/daemon.sh
 
 cat >/run/rig.toml <<END
 [source]
@@ -47,13 +49,6 @@ END
 mkdir /run/recordings
 live=/sys/kernel/config/gpio-sim/rig
 
-start() {
-  systemd-run --unit=stereotrackd --property=Type=notify --property=StateDirectory=stereotrack \
-    /payload/stereotrackd --config /run/rig.toml
-}
-figure() { awk -v name="$1" '$1 == name { print $2 }' /run/results/figures.prom; }
-is() { [[ $(figure "$1") == "$2" ]]; }
-over() { (($(figure "$1") > $2)); }
 said() { journalctl -u stereotrackd -o cat | grep -cE "$1"; }
 said_times() {
   local times
@@ -77,10 +72,9 @@ edge_counts() {
 }
 edges='stereotrack_input_edges_total{input="ready",line="rig:READY"}'
 there='stereotrack_input_there{input="ready",line="rig:READY"}'
-restarts() { systemctl show stereotrackd -p NRestarts --value; }
 
 fact "it starts with its lines" start
-process=$(systemctl show stereotrackd -p MainPID --value)
+process=$(property MainPID)
 fact "a target makes its line active" eventually shows 2 1
 # Its safe state, and that of a chip anew, is the other level.
 fact "no deadline is missed, which one that is active low shows" eventually shows 3 1
@@ -109,9 +103,9 @@ for round in 1 2; do
 done
 fact "the chip was lost twice for outputs" is 'stereotrack_gpio_chips_lost_total{lines="outputs"}' 2
 fact "and for inputs" is 'stereotrack_gpio_chips_lost_total{lines="inputs"}' 2
-fact "no real-time thread asked the heap for anything" test -z "$(grep '^stereotrack_allocations_total.* [^0]' /run/results/figures.prom)"
-fact "it is the process that was started" test "$(systemctl show stereotrackd -p MainPID --value)" = "$process"
-fact "and was not restarted" test "$(restarts)" = 0
+fact "no real-time thread asked the heap for anything" no_heap_calls
+fact "it is the process that was started" test "$(property MainPID)" = "$process"
+fact "and was not restarted" test "$(property NRestarts)" = 0
 
 fact "the chip is taken away for good" unplug
 fact "that is told" eventually said_times 3 '^GPIO outputs .* fail: '
