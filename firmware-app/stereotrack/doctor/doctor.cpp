@@ -19,10 +19,9 @@
 #include "firmware-app/stereotrack/doctor/report.hpp"
 #include "firmware-app/stereotrack/doctor/suggest.hpp"
 
-namespace stereotrack {
+namespace stereotrack::doctor {
 
 namespace fs = std::filesystem;
-using namespace doctor;
 
 namespace {
 
@@ -147,7 +146,7 @@ class Doctor {
     const config::Configuration& c = f_.configuration;
     if (!f_.cameras_wanted) return;
     if (is_stereo(c.camera) && c.calibration.file.empty()) {
-      f_.configuration_problems.push_back(
+      f_.configuration_problems.emplace_back(
           config::error_at(rig_.loaded.origins, "calibration.file",
                            "not set: two views need their calibration; or leave camera.right.device out for mono")
               .what());
@@ -189,6 +188,12 @@ class Doctor {
 
 }  // namespace
 
+}  // namespace stereotrack::doctor
+
+namespace stereotrack {
+
+namespace fs = std::filesystem;
+
 void add_options(CLI::App& command, DoctorArguments& arguments) {
   CLI::Option* config =
       command.add_option("--config", arguments.config, "checks its cameras, lines and rights; else what there is");
@@ -216,23 +221,23 @@ int run_doctor(const DoctorArguments& arguments, std::ostream& out, std::ostream
     throw config::Error(arguments.write->string() +
                         ": is there already and stays as it is: give --write another name, or move it");
   }
-  Doctor doctor(arguments, messages);
-  doctor.look();
-  if (arguments.measure) doctor.measure();
-  const Findings& findings = doctor.findings();
-  const std::vector<Item> items = judge(findings);
-  out << (arguments.json ? json(findings, items) : report(findings, items)) << std::flush;
+  doctor::Doctor visit(arguments, messages);
+  visit.look();
+  if (arguments.measure) visit.measure();
+  const doctor::Findings& findings = visit.findings();
+  const std::vector<doctor::Item> items = judge(findings);
+  out << (arguments.json ? doctor::json(findings, items) : report(findings, items)) << std::flush;
   if (arguments.write) {
     if (!findings.suggestion) {
       throw config::Error(arguments.write->string() + ": not written: there is no camera that can be used");
     }
     std::optional<std::string> calibration;
     if (arguments.calibration) calibration = fs::absolute(*arguments.calibration).lexically_normal().string();
-    write_new_file(*arguments.write, suggest(findings, calibration));
+    doctor::write_new_file(*arguments.write, suggest(findings, calibration));
     messages << arguments.write->string() << ": written; now: stereotrackd --config " << arguments.write->string()
              << " --check-config" << std::endl;
   }
-  return exit_code(worst_of(items));
+  return doctor::exit_code(worst_of(items));
 } catch (const config::Error&) {
   throw;
 } catch (const std::exception& error) {
