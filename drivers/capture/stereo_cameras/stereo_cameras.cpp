@@ -496,7 +496,7 @@ void StereoCameras::count() noexcept {
     add(each.damaged, each.before.damaged, now.damaged);
     add(each.lost, each.before.lost, now.lost);
     add(each.late, each.before.late, now.late);
-    if (!matcher_) continue;
+    if (!matcher_ || (&each != eyes_.data() && !has_two())) continue;  // nobody misses a camera that is not to be
     const trigger::PulseMatcher::Counters& exposures =
         matcher_->counters(&each == eyes_.data() ? Side::kLeft : Side::kRight);
     each.missed.set(exposures.missed);

@@ -252,6 +252,25 @@ TEST(Trigger, ItsPeriodIsThatOfThePairsWhateverTheSensorsCould) {
   }
 }
 
+TEST(Trigger, ACameraThatIsNotToBeMissesNothing) {
+  StereoCameras::Config mono = config();
+  mono.stereo = false;
+  CameraRig rig(mono);
+  test::ScriptedTrigger& trigger = rig.open_with_trigger();
+  std::uint64_t pairs = 0;
+  for (std::uint64_t n = 1; n <= 20; ++n) {
+    rig.advance(kFramePeriod);
+    const nanoseconds pulse = kFramePeriod * static_cast<std::int64_t>(n);
+    trigger.give(n, pulse);
+    if (n != 10) (void)rig.left.expose({.number = n, .time = pulse + kDelay});
+    rig.step();
+    while (rig.pool.take_oldest()) ++pairs;
+  }
+  EXPECT_EQ(pairs, 19U);
+  EXPECT_EQ(rig.cameras->figures().cameras[0].missed, 1U);
+  EXPECT_EQ(rig.cameras->figures().cameras[1].missed, 0U);
+}
+
 /// Cameras over a trigger of the program's own.
 void open_with(CameraRig& rig, std::unique_ptr<trigger::Trigger> trigger) {
   rig.cameras = std::make_unique<StereoCameras>(

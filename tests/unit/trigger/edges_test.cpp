@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "drivers/gpio/simulated_chip.hpp"
@@ -98,6 +101,41 @@ TEST(EdgeTrigger, AChipThatGoesIsToldAndAskedForAnewAndNumbersGoOn) {
   ASSERT_TRUE(trigger.take(pulse));
   EXPECT_EQ(pulse.number, 2U);
   EXPECT_EQ(trigger.lost(), 0U);
+}
+
+// The capture thread takes while the service thread looks after a chip that comes and goes.
+TEST(EdgeTrigger, IsHandedToAndFroBetweenTwoThreads) {
+  EdgeTrigger trigger(spec("edges-threads"), "test");
+  std::atomic<bool> stop{false};
+  std::uint64_t taken = 0;
+  std::uint64_t last = 0;
+  std::thread capture([&] {
+    Trigger::Pulse pulse;
+    while (!stop.load()) {
+      while (trigger.take(pulse)) {
+        EXPECT_GT(pulse.number, last);
+        last = pulse.number;
+        ++taken;
+      }
+    }
+  });
+  MonotonicTime now = kBegin;
+  std::vector<Trigger::Note> notes;
+  for (int round = 0; round < 50; ++round) {
+    // In the service thread's own time: a try each half second at first.
+    for (std::size_t before = notes.size(); notes.size() == before;) {
+      if (notes.size() % 2 == 0) pulse_at("edges-threads", now);
+      sim::set_gone("edges-threads", notes.size() % 2 == 0);
+      trigger.tend(now += milliseconds(100), notes);
+      std::this_thread::yield();
+    }
+  }
+  sim::set_gone("edges-threads", false);
+  stop.store(true);
+  capture.join();
+  ASSERT_EQ(notes.size(), 50U);
+  for (std::size_t i = 0; i < notes.size(); ++i) EXPECT_EQ(notes[i].good, i % 2 == 1) << i << notes[i].text;
+  EXPECT_EQ(last, taken + trigger.lost());
 }
 
 TEST(EdgeTrigger, ALineThatCannotBeHadIsOneLine) {
