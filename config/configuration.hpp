@@ -30,6 +30,12 @@ struct SourceConfig {
 /// Whose cameras they are.
 enum class CameraDriver : unsigned char { kV4l2 };
 
+/// Whose memory frames lie in.
+enum class CameraMemory : unsigned char {
+  kMmap,    ///< the driver's, mapped
+  kDmabuf,  ///< dma-bufs: the driver's, or of camera.heap
+};
+
 struct CameraDeviceConfig {
   std::string device;  ///< as the driver names it
   std::string sensor;  ///< empty: the one that is connected, or the nearest
@@ -39,13 +45,15 @@ struct CameraDeviceConfig {
 struct CameraConfig {
   CameraDriver driver = CameraDriver::kV4l2;
   CameraDeviceConfig left;
-  CameraDeviceConfig right;           ///< empty: one camera, mono
-  bool side_by_side = false;          ///< the left camera's picture holds both views
-  int width = 640;                    ///< [px]
-  int height = 480;                   ///< [px]
-  std::string format = "auto";        ///< a name of the driver's
-  double fps = 30.0;                  ///< [1/s]
-  int buffers = 8;                    ///< a camera
+  CameraDeviceConfig right;     ///< empty: one camera, mono
+  bool side_by_side = false;    ///< the left camera's picture holds both views
+  int width = 640;              ///< [px]
+  int height = 480;             ///< [px]
+  std::string format = "auto";  ///< a name of the driver's
+  double fps = 30.0;            ///< [1/s]
+  int buffers = 8;              ///< a camera
+  CameraMemory memory = CameraMemory::kMmap;
+  std::string heap;                   ///< kDmabuf: a device that gives memory; empty: the driver gives it
   double exposure_us = 0;             ///< [us]; 0: automatic
   double gain = 0;                    ///< 1 = none; 0: automatic
   int black_level = -1;               ///< in the driver's own unit; -1: as the driver has it

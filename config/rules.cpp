@@ -82,6 +82,11 @@ std::string exposure_fits_into_a_period(const Configuration& c) {
   return "an exposure takes longer than there is time between two frames: shorten it, or lower camera.fps";
 }
 
+std::string heap_is_for_dmabufs(const Configuration& c) {
+  if (c.camera.heap.empty() || c.camera.memory == CameraMemory::kDmabuf) return {};
+  return "camera.heap gives dma-bufs, and camera.memory wants none: set it to \"dmabuf\", or leave the heap out";
+}
+
 bool has_trigger(const Configuration& c, TriggerMode mode) { return has_cameras(c) && c.trigger.mode == mode; }
 
 std::string trigger_has_its_line(const Configuration& c) {
@@ -142,6 +147,7 @@ std::span<const Rule> rules() {
       {"cameras_differ", {"camera.right.device", "camera.left.device"}, cameras_differ},
       {"one_camera_has_both_views", {"camera.right.device", "camera.side_by_side"}, one_camera_has_both_views},
       {"exposure_fits_into_a_period", {"camera.exposure_us", "camera.fps"}, exposure_fits_into_a_period},
+      {"heap_is_for_dmabufs", {"camera.heap", "camera.memory"}, heap_is_for_dmabufs},
       {"trigger_has_its_line", {"trigger.line", "trigger.mode"}, trigger_has_its_line},
       {"trigger_has_its_pwm", {"trigger.pwm_chip", "trigger.mode"}, trigger_has_its_pwm},
       {"trigger_line_is_nobody_elses", {"trigger.line"}, trigger_line_is_nobody_elses},

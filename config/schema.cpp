@@ -80,6 +80,12 @@ std::vector<Key> keys_of(Configuration& c) {
       key("camera.buffers", c.camera.buffers, 6, 32, "",
           "Buffers of each camera: four pairs may be on their way, two are the driver's, the others let frames wait "
           "for their partners."),
+      key("camera.memory", c.camera.memory, {{"mmap", CameraMemory::kMmap}, {"dmabuf", CameraMemory::kDmabuf}},
+          "Whose memory frames lie in: the driver's, mapped; or dma-bufs, whose caches are cleaned around each frame, "
+          "where mapped memory is slow to read: the driver's, or those of camera.heap."),
+      key("camera.heap", c.camera.heap, nullptr,
+          "With dmabuf: a device that gives the memory, such as /dev/dma_heap/system, /dev/dma_heap/linux,cma for "
+          "cameras that want it in one piece, or /dev/udmabuf; empty: the camera's driver does."),
       key("camera.exposure_us", c.camera.exposure_us, 0, 1e7, "us", "Exposure of both; 0: automatic, each by itself."),
       key("camera.gain", c.camera.gain, 0, 1000, "", "Gain of both, 1 is none; 0: automatic, each by itself."),
       key("camera.black_level", c.camera.black_level, -1, 65535, "",

@@ -47,6 +47,10 @@ capture::v4l2::Settings camera_settings(const config::CameraConfig& camera, Side
   settings.format = camera.format;
   settings.fps = camera.fps;
   settings.buffers = camera.buffers;
+  settings.heap = camera.heap;
+  if (camera.memory == config::CameraMemory::kDmabuf) {
+    settings.memory = camera.heap.empty() ? capture::v4l2::Memory::kExported : capture::v4l2::Memory::kImported;
+  }
   if (camera.exposure_us > 0) settings.exposure_us = camera.exposure_us;
   if (camera.gain > 0) settings.gain = camera.gain;
   if (camera.black_level >= 0) settings.black_level = camera.black_level;
