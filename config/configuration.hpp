@@ -30,6 +30,12 @@ struct SourceConfig {
 /// Whose cameras they are.
 enum class CameraDriver : unsigned char { kV4l2, kLibcamera };
 
+/// Whose memory frames lie in.
+enum class CameraMemory : unsigned char {
+  kMmap,    ///< the driver's, mapped
+  kDmabuf,  ///< dma-bufs: the driver's, or of camera.heap
+};
+
 struct CameraDeviceConfig {
   std::string device;  ///< as the driver names it
   std::string sensor;  ///< empty: the one that is connected, or the nearest
@@ -39,22 +45,50 @@ struct CameraDeviceConfig {
 struct CameraConfig {
   CameraDriver driver = CameraDriver::kV4l2;
   CameraDeviceConfig left;
-  CameraDeviceConfig right;           ///< empty: one camera, mono
-  bool side_by_side = false;          ///< the left camera's picture holds both views
-  int width = 640;                    ///< [px]
-  int height = 480;                   ///< [px]
-  std::string format = "auto";        ///< a name of the driver's
-  double fps = 30.0;                  ///< [1/s]
-  int buffers = 8;                    ///< a camera
+  CameraDeviceConfig right;     ///< empty: one camera, mono
+  bool side_by_side = false;    ///< the left camera's picture holds both views
+  int width = 640;              ///< [px]
+  int height = 480;             ///< [px]
+  std::string format = "auto";  ///< a name of the driver's
+  double fps = 30.0;            ///< [1/s]
+  int buffers = 8;              ///< a camera
+  CameraMemory memory = CameraMemory::kMmap;
+  std::string heap;                   ///< kDmabuf: a device that gives memory; empty: the driver gives it
   double exposure_us = 0;             ///< [us]; 0: automatic
   double gain = 0;                    ///< 1 = none; 0: automatic
   int black_level = -1;               ///< in the driver's own unit; -1: as the driver has it
   double readout_us = 0;              ///< [us]; 0: as the driver tells
-  bool triggered = false;             ///< frames come when a trigger asks, so silence of both is no fault
   double timeout_ms = 500;            ///< [ms]
   double tolerance = 0.25;            ///< of the period
   double skew_limit_ms = 5;           ///< alarm [ms]; 0: none
   double exposure_limit_percent = 5;  ///< alarm; 0: none
+};
+
+enum class ActiveLevel : unsigned char { kHigh, kLow };
+enum class InputEdge : unsigned char { kRising, kFalling, kBoth };
+enum class InputBias : unsigned char { kAsIs, kNone, kPullUp, kPullDown };
+
+/// Who asks the cameras for exposures. With all but the first, silence of both cameras is no fault of theirs.
+enum class TriggerMode : unsigned char {
+  kFreeRun,   ///< nobody: each sensor runs by itself
+  kUnseen,    ///< somebody who does not tell us: wires between the cameras, a generator of its own
+  kGpio,      ///< we, by a line that a real-time thread sets: see drivers/trigger/pulse_train.hpp
+  kPwm,       ///< we, by hardware PWM: see drivers/trigger/pwm.hpp
+  kExternal,  ///< somebody whose edges we see: see drivers/trigger/edges.hpp
+};
+
+/// The trigger of source.name = "cameras"; no other source looks at it. camera.fps is its rate.
+struct TriggerConfig {
+  TriggerMode mode = TriggerMode::kFreeRun;
+  std::string line;                         ///< CHIP:LINE, see drivers/gpio/line.hpp; kGpio: driven, kExternal: read
+  ActiveLevel active = ActiveLevel::kHigh;  ///< level of the line, or of the PWM output, when it is active
+  InputEdge edge = InputEdge::kRising;      ///< that begins an exposure: becoming active, or inactive
+  InputBias bias = InputBias::kAsIs;        ///< kExternal
+  double pulse_us = 1000;                   ///< the line is active for so long [us]; kGpio, kPwm
+  double delay_us = 0;                      ///< from the edge to the beginning of the exposure [us]; kGpio, kExternal
+  double late_us = 1000;                    ///< a pulse that would begin later than this is skipped [us]; kGpio
+  std::string pwm_chip;                     ///< pwmchip0, 0, its path, or its device's name
+  int pwm_channel = 0;
 };
 
 /// What `synthetic:NAME` draws; no other source looks at it.
@@ -93,6 +127,7 @@ enum class RealTimeMode : unsigned char {
 struct RealTimeConfig {
   RealTimeMode mode = RealTimeMode::kTry;
   bool deep_sleep = false;
+  ThreadConfig trigger{.priority = 83};
   ThreadConfig publisher{.priority = 82};
   ThreadConfig capture{.priority = 81};
   ThreadConfig frames{.priority = 80};
@@ -153,7 +188,6 @@ enum class SignalWhen : unsigned char {
   kDeadlineMissed,
 };
 enum class SignalMode : unsigned char { kLevel, kPulse };
-enum class ActiveLevel : unsigned char { kHigh, kLow };
 enum class SafeState : unsigned char { kInactive, kActive };
 
 /// [[signal]]: one line and its rule. See firmware-app/signals/signal_rules.hpp.
@@ -172,9 +206,6 @@ struct SignalConfig {
   SafeState safe = SafeState::kInactive;
   friend bool operator==(const SignalConfig&, const SignalConfig&) = default;
 };
-
-enum class InputEdge : unsigned char { kRising, kFalling, kBoth };
-enum class InputBias : unsigned char { kAsIs, kNone, kPullUp, kPullDown };
 
 /// [[input]]: a line whose edges something follows from. See drivers/gpio/input_lines.hpp.
 struct InputConfig {
@@ -209,6 +240,7 @@ struct Configuration {
   std::string preset = "robust";  ///< where the values not given by the user came from
   SourceConfig source;
   CameraConfig camera;
+  TriggerConfig trigger;
   SyntheticConfig synthetic;
   LatencyConfig latency;
   RealTimeConfig realtime;

@@ -93,6 +93,44 @@ std::string exposure_fits_into_a_period(const Configuration& c) {
   return "an exposure takes longer than there is time between two frames: shorten it, or lower camera.fps";
 }
 
+std::string heap_is_for_dmabufs(const Configuration& c) {
+  if (c.camera.heap.empty() || c.camera.memory == CameraMemory::kDmabuf) return {};
+  return "camera.heap gives dma-bufs, and camera.memory wants none: set it to \"dmabuf\", or leave the heap out";
+}
+
+bool has_trigger(const Configuration& c, TriggerMode mode) { return has_cameras(c) && c.trigger.mode == mode; }
+
+std::string trigger_has_its_line(const Configuration& c) {
+  const bool wanted = has_trigger(c, TriggerMode::kGpio) || has_trigger(c, TriggerMode::kExternal);
+  if (!wanted || !c.trigger.line.empty()) return {};
+  return "trigger.line is missing, gpio and external need it: give CHIP:LINE, for example \"gpiochip0:17\"";
+}
+
+std::string trigger_has_its_pwm(const Configuration& c) {
+  if (!has_trigger(c, TriggerMode::kPwm) || !c.trigger.pwm_chip.empty()) return {};
+  return "trigger.pwm_chip is missing, pwm needs it: give a chip of /sys/class/pwm, for example \"pwmchip0\"";
+}
+
+std::string trigger_line_is_nobody_elses(const Configuration& c) {
+  if (!has_trigger(c, TriggerMode::kGpio) && !has_trigger(c, TriggerMode::kExternal)) return {};
+  const auto has_it = [&](const auto& table) { return table.line == c.trigger.line; };
+  const auto signal = std::find_if(c.signals.begin(), c.signals.end(), has_it);
+  if (signal != c.signals.end())
+    return quoted(c.trigger.line) + " is that of signal " + signal->name + ", too: give two";
+  const auto input = std::find_if(c.inputs.begin(), c.inputs.end(), has_it);
+  if (input != c.inputs.end()) return quoted(c.trigger.line) + " is that of input " + input->name + ", too: give two";
+  return {};
+}
+
+std::string pulse_fits_into_a_period(const Configuration& c) {
+  const bool ours = has_trigger(c, TriggerMode::kGpio) || has_trigger(c, TriggerMode::kPwm);
+  const double late_us = c.trigger.mode == TriggerMode::kGpio ? c.trigger.late_us : 0;
+  if (!ours || (c.trigger.pulse_us + late_us) * c.camera.fps < 1e6) return {};
+  return late_us > 0 ? "a pulse that begins late_us late is not over when the next one is due: shorten one of them, or "
+                       "lower camera.fps"
+                     : "a pulse takes longer than there is time between two: shorten it, or lower camera.fps";
+}
+
 /// Set by the user, not by a preset or a default.
 bool said_by_user(const Loaded& loaded, std::string_view key) {
   const auto origin = loaded.origins.find(key);
@@ -124,6 +162,11 @@ std::span<const Rule> rules() {
        libcamera_connects_by_itself},
       {"libcamera_has_no_black_level", {"camera.black_level", "camera.driver"}, libcamera_has_no_black_level},
       {"exposure_fits_into_a_period", {"camera.exposure_us", "camera.fps"}, exposure_fits_into_a_period},
+      {"heap_is_for_dmabufs", {"camera.heap", "camera.memory"}, heap_is_for_dmabufs},
+      {"trigger_has_its_line", {"trigger.line", "trigger.mode"}, trigger_has_its_line},
+      {"trigger_has_its_pwm", {"trigger.pwm_chip", "trigger.mode"}, trigger_has_its_pwm},
+      {"trigger_line_is_nobody_elses", {"trigger.line"}, trigger_line_is_nobody_elses},
+      {"pulse_fits_into_a_period", {"trigger.pulse_us", "trigger.late_us", "camera.fps"}, pulse_fits_into_a_period},
       {"split_stays_split", {"objects.merge_depth", "objects.split_depth"}, split_stays_split},
   };
   return all;

@@ -25,6 +25,9 @@ std::string check_destination(std::string_view text) {
   return quoted(text) + " is not ADDR:PORT: write it like \"192.168.1.10:9000\" or \"[fe80::1]:9000\"";
 }
 
+/// A line that may be left out.
+std::string check_line_or_none(std::string_view text) { return text.empty() ? std::string() : check_line(text); }
+
 void add_thread(std::vector<Key>& keys, const std::string& thread, ThreadConfig& config, std::string_view does) {
   keys.push_back(key("thread." + thread + ".priority", config.priority, 0, 99, "",
                      "Real-time priority of the thread that " + std::string(does) +
@@ -75,19 +78,22 @@ std::vector<Key> keys_of(Configuration& c) {
       key("camera.height", c.camera.height, 16, 8192, "px", "Height of them."),
       key("camera.format", c.camera.format, nullptr,
           "How pictures lie in memory, such as grey8, yuyv, nv12, rggb10p; auto: grey, else what is cheapest to read."),
-      key("camera.fps", c.camera.fps, 0.1, 1000, "1/s", "Frames a second of each camera."),
+      key("camera.fps", c.camera.fps, 0.1, 1000, "1/s", "Frames a second of each camera, and pulses of its trigger."),
       key("camera.buffers", c.camera.buffers, 6, 32, "",
           "Buffers of each camera: four pairs may be on their way, two are the driver's, the others let frames wait "
           "for their partners."),
+      key("camera.memory", c.camera.memory, {{"mmap", CameraMemory::kMmap}, {"dmabuf", CameraMemory::kDmabuf}},
+          "Whose memory frames lie in: the driver's, mapped; or dma-bufs, whose caches are cleaned around each frame, "
+          "where mapped memory is slow to read: the driver's, or those of camera.heap."),
+      key("camera.heap", c.camera.heap, nullptr,
+          "With dmabuf: a device that gives the memory, such as /dev/dma_heap/system, /dev/dma_heap/linux,cma for "
+          "cameras that want it in one piece, or /dev/udmabuf; empty: the camera's driver does."),
       key("camera.exposure_us", c.camera.exposure_us, 0, 1e7, "us", "Exposure of both; 0: automatic, each by itself."),
       key("camera.gain", c.camera.gain, 0, 1000, "", "Gain of both, 1 is none; 0: automatic, each by itself."),
       key("camera.black_level", c.camera.black_level, -1, 65535, "",
           "Black level of both in the driver's own unit; -1: as the driver has it. Not with libcamera."),
       key("camera.readout_us", c.camera.readout_us, 0, 1e7, "us",
           "From the end of an exposure to the end of its frame, where the driver stamps the latter; 0: as it tells."),
-      key("camera.triggered", c.camera.triggered,
-          "Frames come only when a trigger asks for them: that neither camera gives any is told, and no fault of "
-          "theirs."),
       key("camera.timeout_ms", c.camera.timeout_ms, 10, 60000, "ms",
           "A camera that is silent for longer, once a frame has come, is given up and opened anew; four periods at "
           "least. Without the right one it goes on in mono."),
@@ -98,6 +104,41 @@ std::vector<Key> keys_of(Configuration& c) {
           "A pair whose exposures are further apart raises an alarm in health; 0: none does."),
       key("camera.exposure_limit_percent", c.camera.exposure_limit_percent, 0, 100, "%",
           "Exposures of a pair that differ by more of the longer one raise an alarm in health; 0: none do."),
+
+      key("trigger.mode", c.trigger.mode,
+          {{"free-run", TriggerMode::kFreeRun},
+           {"unseen", TriggerMode::kUnseen},
+           {"gpio", TriggerMode::kGpio},
+           {"pwm", TriggerMode::kPwm},
+           {"external", TriggerMode::kExternal}},
+          "Who asks the cameras for exposures: nobody, each runs by itself; somebody who does not tell us, such as "
+          "wires between the cameras; we, by the pulses of a line or of hardware PWM; somebody whose edges a line "
+          "shows us. With all but the first, that neither camera gives frames is told and no fault of theirs; "
+          "docs/CAMERAS.md."),
+      key("trigger.line", c.trigger.line, check_line_or_none,
+          "CHIP:LINE, as a signal's: driven with gpio, read with external; camera.fps pulses a second either way."),
+      key("trigger.active", c.trigger.active, {{"high", ActiveLevel::kHigh}, {"low", ActiveLevel::kLow}},
+          "Level of the line, or of the PWM output, when it is active."),
+      key("trigger.edge", c.trigger.edge, {{"rising", InputEdge::kRising}, {"falling", InputEdge::kFalling}},
+          "Which edge begins an exposure: becoming active, or inactive."),
+      key("trigger.bias", c.trigger.bias,
+          {{"as_is", InputBias::kAsIs},
+           {"none", InputBias::kNone},
+           {"pull_up", InputBias::kPullUp},
+           {"pull_down", InputBias::kPullDown}},
+          "With external: what the chip holds the line's level with where nothing drives it; not every chip can."),
+      key("trigger.pulse_us", c.trigger.pulse_us, 1, 1e7, "us",
+          "How long the line, or the PWM output, is active for one exposure."),
+      key("trigger.delay_us", c.trigger.delay_us, 0, 1e7, "us",
+          "From the edge to the beginning of the exposure, with gpio and external: frames are matched with pulses by "
+          "it, within camera.tolerance."),
+      key("trigger.late_us", c.trigger.late_us, 10, 1e6, "us",
+          "With gpio: a pulse that the thread would begin later than this after its time is skipped and counted, for "
+          "it slept."),
+      key("trigger.pwm_chip", c.trigger.pwm_chip, nullptr,
+          "With pwm: the chip in /sys/class/pwm, as pwmchip0, or by the name of its device, such as fe20c000.pwm, "
+          "which does not change with the order of drivers."),
+      key("trigger.pwm_channel", c.trigger.pwm_channel, 0, 255, "", "Its channel."),
 
       key("synthetic.seed", c.synthetic.seed, 0, 4294967295.0, "",
           "Which drawing of the scene synthetic:NAME shows; no other source looks at this section."),
@@ -319,7 +360,9 @@ std::vector<Key> keys_of(Configuration& c) {
       key("track.straight_part", p.track.straight_part, 0, 1, "path",
           "Part of its path that this way must be: flicker jumps to and fro."),
   };
-  add_thread(keys, "publisher", c.realtime.publisher, "lets results leave: the highest, it runs for microseconds");
+  add_thread(keys, "trigger", c.realtime.trigger,
+             "gives pulses with trigger.mode = gpio: the highest, it runs for microseconds");
+  add_thread(keys, "publisher", c.realtime.publisher, "lets results leave: high, it runs for microseconds");
   add_thread(keys, "capture", c.realtime.capture, "takes frames from the sensors");
   add_thread(keys, "frames", c.realtime.frames, "runs the pipeline");
   add_thread(keys, "service", c.realtime.service,

@@ -18,16 +18,6 @@ std::string check_name(std::string_view text) {
   return good ? std::string() : quoted(text) + " is no name: give 1 to 32 letters, digits, _ and -";
 }
 
-/// CHIP:LINE. Whether there is such a line shows when it is asked for.
-std::string check_line(std::string_view text) {
-  const std::size_t colon = text.rfind(':');
-  const bool good = colon != text.npos && colon > 0 && colon + 1 < text.size() && text.find_first_of(" \t\r\n") != 0 &&
-                    text.find_last_of(" \t\r\n") != text.size() - 1;
-  if (good) return {};
-  return quoted(text) +
-         " is no GPIO line: write CHIP:LINE, for example \"gpiochip0:17\", \"pinctrl-bcm2711:GPIO17\" or \"sim:near\"";
-}
-
 /// A signal may name no zone.
 std::string check_zone(std::string_view text) { return text.empty() ? std::string() : check_name(text); }
 
@@ -182,6 +172,15 @@ void refuse_if(const Loaded& loaded, const std::string& table, const Wrong& wron
 }
 
 }  // namespace
+
+std::string check_line(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  const bool good = colon != text.npos && colon > 0 && colon + 1 < text.size() && text.find_first_of(" \t\r\n") != 0 &&
+                    text.find_last_of(" \t\r\n") != text.size() - 1;
+  if (good) return {};
+  return quoted(text) +
+         " is no GPIO line: write CHIP:LINE, for example \"gpiochip0:17\", \"pinctrl-bcm2711:GPIO17\" or \"sim:near\"";
+}
 
 Key zones_key(std::vector<ZoneConfig>& zones) {
   ZoneConfig gate;

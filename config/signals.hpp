@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/configuration.hpp"
@@ -14,6 +15,9 @@ inline constexpr std::size_t kMaxZones = 16;
 inline constexpr std::size_t kMaxSignals = 16;
 inline constexpr std::size_t kMaxInputs = 16;
 inline constexpr std::size_t kMaxCorners = 16;  ///< of a zone in the picture
+
+/// Why this is not CHIP:LINE; empty: it is. Whether there is such a line shows when it is asked for.
+[[nodiscard]] std::string check_line(std::string_view text);
 
 /// [[zone]], [[signal]] and [[input]], for the table in schema.cpp.
 [[nodiscard]] Key zones_key(std::vector<ZoneConfig>& zones);

@@ -66,7 +66,9 @@ struct SourceFigures {
   std::uint64_t waiting_high = 0;
   bool has_trigger = false;                       ///< pulses are told
   bool trigger_silent = false;                    ///< now: frames come, and no pulses
+  bool trigger_unanswered = false;                ///< now: frames come, and answer no pulse
   std::uint64_t pulses = 0;                       ///< number of the last one
+  std::uint64_t pulses_lost = 0;                  ///< known to have been, and not told
   std::uint64_t mono_pairs = 0;                   ///< put with an empty right picture
   std::uint64_t notes_lost = 0;                   ///< changes of state that the log lacks
   std::optional<std::chrono::nanoseconds> phase;  ///< by how much the right exposes later, within half a period

@@ -217,6 +217,13 @@ void check_inputs(std::span<const InputSpec> specs) {
   }
 }
 
+std::unique_ptr<InputRequest> request_input(const InputSpec& spec, std::string_view consumer) {
+  check_inputs({&spec, 1});
+  const gpiod::Found found = locate(spec.name);
+  const WantedInput wanted{spec, found.offset};
+  return request(found.path, {&wanted, 1}, consumer);
+}
+
 InputLines open_inputs(std::span<const InputSpec> specs, std::string_view consumer) {
   check_inputs(specs);
   InputLines lines;

@@ -138,6 +138,10 @@ class InputLines {
   std::unique_ptr<State> state_;
 };
 
+/// One line alone, for a thread that may neither lock nor free memory when its chip goes: the chip's own request, where
+/// InputLines would look after it. Throws as open_inputs().
+[[nodiscard]] std::unique_ptr<InputRequest> request_input(const InputSpec& spec, std::string_view consumer);
+
 /// What this build and this kernel cannot do of what is asked for, whether the chips are there or not. Throws
 /// std::runtime_error with one line: more than kMaxLines, a line named twice, debounce with libgpiod 1, a kernel before
 /// 5.7 with it.

@@ -117,6 +117,16 @@ struct Status {
   std::uint32_t send_error_max_us = 0;
   std::uint32_t skew_max_us = 0;
 
+  std::uint64_t trigger_pulses = 0;  ///< trigger::PulseTrain::Counters, or pulses that were seen
+  std::uint64_t trigger_skipped = 0;
+  std::uint64_t trigger_failed = 0;
+  std::uint64_t exposures_missed_left = 0;  ///< trigger::PulseMatcher::Counters, these six
+  std::uint64_t exposures_missed_right = 0;
+  std::uint64_t exposures_doubled_left = 0;
+  std::uint64_t exposures_doubled_right = 0;
+  std::uint64_t exposures_stray_left = 0;
+  std::uint64_t exposures_stray_right = 0;
+
   [[nodiscard]] bool operator==(const Status&) const noexcept = default;
 };
 

@@ -175,6 +175,15 @@ void describe(const Status& status, stereotrack_Status& out) noexcept {
   out.send_error_p99_us = status.send_error_p99_us;
   out.send_error_max_us = status.send_error_max_us;
   out.skew_max_us = status.skew_max_us;
+  out.trigger_pulses = status.trigger_pulses;
+  out.trigger_skipped = status.trigger_skipped;
+  out.trigger_failed = status.trigger_failed;
+  out.exposures_missed_left = status.exposures_missed_left;
+  out.exposures_missed_right = status.exposures_missed_right;
+  out.exposures_doubled_left = status.exposures_doubled_left;
+  out.exposures_doubled_right = status.exposures_doubled_right;
+  out.exposures_stray_left = status.exposures_stray_left;
+  out.exposures_stray_right = status.exposures_stray_right;
 }
 
 /// Its bytes, signed if there is a signer; none if it does not fit, which the static_asserts exclude.

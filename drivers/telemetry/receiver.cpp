@@ -116,6 +116,15 @@ Status read(const stereotrack_Status& in) noexcept {
   out.send_error_p99_us = in.send_error_p99_us;
   out.send_error_max_us = in.send_error_max_us;
   out.skew_max_us = in.skew_max_us;
+  out.trigger_pulses = in.trigger_pulses;
+  out.trigger_skipped = in.trigger_skipped;
+  out.trigger_failed = in.trigger_failed;
+  out.exposures_missed_left = in.exposures_missed_left;
+  out.exposures_missed_right = in.exposures_missed_right;
+  out.exposures_doubled_left = in.exposures_doubled_left;
+  out.exposures_doubled_right = in.exposures_doubled_right;
+  out.exposures_stray_left = in.exposures_stray_left;
+  out.exposures_stray_right = in.exposures_stray_right;
   return out;
 }
 

@@ -31,28 +31,28 @@ void PulseMatcher::pulse(std::uint64_t number, CaptureTime time) noexcept {
   pulses_[number % kKept] = {number, time + config_.delay, {}, {}};
 }
 
-PulseMatcher::Found PulseMatcher::frame(Side side, CaptureTime mid_exposure) noexcept {
+PulseMatcher::Found PulseMatcher::frame(Side side, CaptureTime begin) noexcept {
   const auto s = static_cast<std::size_t>(side);
   Pulse* nearest = nullptr;
   for (Pulse& pulse : pulses_) {
     if (pulse.number == 0) continue;
-    if (nearest == nullptr ||
-        std::chrono::abs(mid_exposure - pulse.middle) < std::chrono::abs(mid_exposure - nearest->middle)) {
+    if (nearest == nullptr || std::chrono::abs(begin - pulse.begin) < std::chrono::abs(begin - nearest->begin)) {
       nearest = &pulse;
     }
   }
-  if (nearest == nullptr || std::chrono::abs(mid_exposure - nearest->middle) > tolerance_) {
+  const std::chrono::nanoseconds off = nearest == nullptr ? std::chrono::nanoseconds(0) : begin - nearest->begin;
+  if (nearest == nullptr || std::chrono::abs(off) > tolerance_) {
     ++counters_[s].stray;
-    return {};
+    return {Kind::kStray, 0, off};
   }
   if (nearest->answered[s]) {
     ++counters_[s].doubled;
-    return {Kind::kDoubled, nearest->number};
+    return {Kind::kDoubled, nearest->number, off};
   }
   miss_before(s, nearest->number);
   nearest->answered[s] = nearest->settled[s] = true;
   ++counters_[s].answered;
-  return {Kind::kAnswer, nearest->number};
+  return {Kind::kAnswer, nearest->number, off};
 }
 
 void PulseMatcher::restart(Side side) noexcept {

@@ -13,10 +13,8 @@ namespace stereotrack::trigger {
 
 /// Which pulse of the trigger a frame answers: counts of pulses against counts of frames, by time.
 ///
-///     pulse k at p_k asks each sensor for one exposure:  m_k = p_k + delay      delay: from a pulse to the middle of
-///     the
-///                                                                               exposure that it asks for
-///     a frame exposed at t answers the k nearest to it,  |t - m_k| <= tolerance x period,  or none
+///     pulse k at p_k asks each sensor for one exposure, which begins at  b_k = p_k + delay
+///     a frame whose exposure began at t answers the k nearest to it,     |t - b_k| <= tolerance x period,  or none
 ///
 /// The number of its pulse then is a frame's sequence for the Pairer (Config::sequenced): frames of different pulses
 /// are no pair, whatever their times. What goes wrong at one side is found there, with its next frame or, where none
@@ -42,7 +40,8 @@ class PulseMatcher {
   enum class Kind : std::uint8_t { kAnswer, kDoubled, kStray };
   struct Found {
     Kind kind = Kind::kStray;
-    std::uint64_t number = 0;  ///< of the pulse; 0: kStray
+    std::uint64_t number = 0;         ///< of the pulse; 0: kStray
+    std::chrono::nanoseconds off{0};  ///< by how much it began later than the nearest pulse asks for; 0: none is known
   };
 
   /// Of one side, since the start.
@@ -60,7 +59,7 @@ class PulseMatcher {
   void pulse(std::uint64_t number, CaptureTime time) noexcept;
 
   /// A frame has come; times of a side rise but for what its driver does wrong.
-  [[nodiscard]] Found frame(Side side, CaptureTime mid_exposure) noexcept;
+  [[nodiscard]] Found frame(Side side, CaptureTime begin) noexcept;
 
   /// A sensor stops or starts anew: pulses so far are none that it owes a frame for.
   void restart(Side side) noexcept;
@@ -71,7 +70,7 @@ class PulseMatcher {
  private:
   struct Pulse {
     std::uint64_t number = 0;       ///< 0: none
-    CaptureTime middle{};           ///< of the exposures that it asks for
+    CaptureTime begin{};            ///< of the exposures that it asks for
     std::array<bool, 2> settled{};  ///< by side: answered, missed, or not owed
     std::array<bool, 2> answered{};
   };

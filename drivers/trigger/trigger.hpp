@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "pipeline/core/time.hpp"
 
@@ -15,6 +17,12 @@ class Trigger {
     MonotonicTime time{};      ///< of the edge that begins an exposure
   };
 
+  /// A line for the log: of a change, once.
+  struct Note {
+    bool good = false;  ///< else a warning
+    std::string text;
+  };
+
   Trigger() = default;
   Trigger(const Trigger&) = delete;
   Trigger& operator=(const Trigger&) = delete;
@@ -25,6 +33,16 @@ class Trigger {
 
   /// The oldest pulse that was not told yet; false: none. Does not wait; no lock, no heap.
   [[nodiscard]] virtual bool take(Pulse& pulse) noexcept = 0;
+
+  /// Service thread, about every 0.1 s: what waits or takes memory, such as asking for a chip anew. Throws nothing but
+  /// std::bad_alloc.
+  virtual void tend(MonotonicTime now, std::vector<Note>& notes) {
+    (void)now;
+    (void)notes;
+  }
+
+  /// Any thread. Pulses that are known to have been and were not told.
+  [[nodiscard]] virtual std::uint64_t lost() const noexcept { return 0; }
 };
 
 }  // namespace stereotrack::trigger

@@ -7,6 +7,7 @@
 
 #include "config/error.hpp"
 #include "config/milliseconds.hpp"
+#include "firmware-app/rig/trigger.hpp"
 
 namespace stereotrack {
 
@@ -51,6 +52,10 @@ capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, Side s
   settings.format = camera.format;
   settings.fps = camera.fps;
   settings.buffers = camera.buffers;
+  settings.heap = camera.heap;
+  if (camera.memory == config::CameraMemory::kDmabuf) {
+    settings.memory = camera.heap.empty() ? capture::v4l2::Memory::kExported : capture::v4l2::Memory::kImported;
+  }
   settings.exposure_us = set_by_user(camera.exposure_us);
   settings.gain = set_by_user(camera.gain);
   if (camera.black_level >= 0) settings.black_level = camera.black_level;
@@ -72,14 +77,21 @@ capture::libcamera::Settings libcamera_settings(const config::CameraConfig& came
   return settings;
 }
 
-capture::StereoCameras::Config pairing_config(const config::CameraConfig& camera) {
+capture::StereoCameras::Config pairing_config(const config::Configuration& configuration) {
+  const config::CameraConfig& camera = configuration.camera;
+  const config::TriggerConfig& trigger = configuration.trigger;
   capture::StereoCameras::Config pairing;
   pairing.name = source_name(camera);
   pairing.stereo = !camera.right.device.empty();
   pairing.side_by_side = camera.side_by_side;
   pairing.tolerance = camera.tolerance;
-  pairing.triggered = camera.triggered;
   pairing.timeout = config::from_ms(camera.timeout_ms);
+  pairing.exposure = config::from_ms(camera.exposure_us * 1e-3);
+  if (trigger.mode == config::TriggerMode::kFreeRun) return pairing;
+  // The sensors could do another rate; they get this one.
+  pairing.triggered = true;
+  pairing.period = trigger_period(configuration);
+  pairing.pulse_delay = config::from_ms(trigger.delay_us * 1e-3);
   return pairing;
 }
 
@@ -96,10 +108,11 @@ capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
 }
 
 std::unique_ptr<capture::StereoCameras> open_cameras(const config::Loaded& loaded,
-                                                     std::function<void(const std::string&)> say) {
+                                                     std::function<void(const std::string&)> say,
+                                                     std::unique_ptr<trigger::Trigger> trigger) {
   check_format(loaded);
-  const config::CameraConfig& camera = loaded.configuration.camera;
-  return std::make_unique<capture::StereoCameras>(camera_opener(camera, std::move(say)), pairing_config(camera));
+  return std::make_unique<capture::StereoCameras>(camera_opener(loaded.configuration.camera, std::move(say)),
+                                                  pairing_config(loaded.configuration), std::move(trigger));
 }
 
 CameraCheck check_cameras(const config::Loaded& loaded) {
@@ -123,7 +136,7 @@ CameraCheck check_cameras(const config::Loaded& loaded) {
     }
   }
   if (!first) return check;
-  const capture::StereoCameras::Config pairing = pairing_config(camera);
+  const capture::StereoCameras::Config pairing = pairing_config(loaded.configuration);
   if (std::string wrong = capture::split_refusal(pairing, *first); !wrong.empty()) {
     check.failures.push_back(std::move(wrong));
   }

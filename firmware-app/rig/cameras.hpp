@@ -21,16 +21,18 @@ inline constexpr std::string_view kCameras = "cameras";
 [[nodiscard]] capture::libcamera::Settings libcamera_settings(const config::CameraConfig& camera, trigger::Side side);
 
 /// How two of them become pairs.
-[[nodiscard]] capture::StereoCameras::Config pairing_config(const config::CameraConfig& camera);
+[[nodiscard]] capture::StereoCameras::Config pairing_config(const config::Configuration& configuration);
 
 /// Opens the camera of a side as camera.* says, now and each time that it was lost. `say`, which may be called by the
 /// thread that opens, is told what the driver made of the wish; it must outlive what is returned.
 [[nodiscard]] capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
                                                          std::function<void(const std::string&)> say);
 
-/// Opens and starts the cameras. Throws config::Error (the keys), or std::runtime_error naming the device.
+/// Opens and starts the cameras. Throws config::Error (the keys), or std::runtime_error naming the device. `trigger`:
+/// what tells of pulses, of open_trigger(); null: nobody.
 [[nodiscard]] std::unique_ptr<capture::StereoCameras> open_cameras(const config::Loaded& loaded,
-                                                                   std::function<void(const std::string&)> say);
+                                                                   std::function<void(const std::string&)> say,
+                                                                   std::unique_ptr<trigger::Trigger> trigger = nullptr);
 
 /// What --check-config says of them: each is opened as a run would, and closed again.
 struct CameraCheck {

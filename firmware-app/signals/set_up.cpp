@@ -95,4 +95,23 @@ SignalRules make_rules(const config::Configuration& configuration, double unit_m
   return *rules;
 }
 
+gpio::Edges edges_of(config::InputEdge edge) noexcept {
+  switch (edge) {
+    case config::InputEdge::kRising: return gpio::Edges::kRising;
+    case config::InputEdge::kFalling: return gpio::Edges::kFalling;
+    case config::InputEdge::kBoth: break;
+  }
+  return gpio::Edges::kBoth;
+}
+
+gpio::Bias bias_of(config::InputBias bias) noexcept {
+  switch (bias) {
+    case config::InputBias::kAsIs: break;
+    case config::InputBias::kNone: return gpio::Bias::kNone;
+    case config::InputBias::kPullUp: return gpio::Bias::kPullUp;
+    case config::InputBias::kPullDown: return gpio::Bias::kPullDown;
+  }
+  return gpio::Bias::kAsIs;
+}
+
 }  // namespace stereotrack::signals

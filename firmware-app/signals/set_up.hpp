@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "config/configuration.hpp"
+#include "drivers/gpio/input_lines.hpp"
 #include "drivers/gpio/line.hpp"
 #include "firmware-app/signals/signal_rules.hpp"
 
@@ -16,5 +17,9 @@ namespace stereotrack::signals {
 /// known. `stale_after`: see SignalRules. Throws config::Error; what load() and check_metres() let pass does not.
 [[nodiscard]] SignalRules make_rules(const config::Configuration& configuration, double unit_m,
                                      std::chrono::nanoseconds stale_after);
+
+/// Words of the configuration in the driver's own.
+[[nodiscard]] gpio::Edges edges_of(config::InputEdge edge) noexcept;
+[[nodiscard]] gpio::Bias bias_of(config::InputBias bias) noexcept;
 
 }  // namespace stereotrack::signals

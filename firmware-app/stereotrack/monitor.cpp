@@ -199,6 +199,15 @@ void append_status(std::string& json, const Status& s, std::uint64_t sequence) {
   field("send_error_p99_us", s.send_error_p99_us);
   field("send_error_max_us", s.send_error_max_us);
   field("skew_max_us", s.skew_max_us);
+  field("trigger_pulses", s.trigger_pulses);
+  field("trigger_skipped", s.trigger_skipped);
+  field("trigger_failed", s.trigger_failed);
+  field("exposures_missed_left", s.exposures_missed_left);
+  field("exposures_missed_right", s.exposures_missed_right);
+  field("exposures_doubled_left", s.exposures_doubled_left);
+  field("exposures_doubled_right", s.exposures_doubled_right);
+  field("exposures_stray_left", s.exposures_stray_left);
+  field("exposures_stray_right", s.exposures_stray_right);
   json += '}';
 }
 

@@ -14,6 +14,7 @@
 #include "firmware-app/rig/rig.hpp"
 #include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/stereotrackd/log.hpp"
+#include "firmware-app/stereotrackd/trigger_rt.hpp"
 
 namespace stereotrack::daemon {
 
@@ -82,6 +83,8 @@ runtime::EffortController::Config effort_config(const config::ShedConfig& shed) 
 Daemon::Daemon(Parts parts)
     : vitals_(std::make_unique<Vitals>()),
       source_(std::move(parts.source)),
+      train_(std::move(parts.train)),
+      pwm_(std::move(parts.pwm)),
       lines_(std::move(parts.lines)),
       inputs_(std::move(parts.inputs)),
       signer_(std::move(parts.signer)),
@@ -112,6 +115,7 @@ Daemon::Daemon(Parts parts)
   publishing.heart_after = config::from_ms(configuration.latency.stale_ms);
   publishing.late_after = config::from_ms(configuration.latency.late_ms);
   publishing.awake = config::from_ms(configuration.latency.awake_ms);
+  publishing.train = train_ ? &train_->counters() : nullptr;
   publishing.pool_slots = parts.pool_slots;
   publishing.skew_limit = config::from_ms(configuration.camera.skew_limit_ms);
   publishing.exposure_limit = configuration.camera.exposure_limit_percent / 100;
@@ -121,6 +125,7 @@ Daemon::Daemon(Parts parts)
     throw config::Error("latency: no schedule fits " + info.name + ": " + to_string(publisher.error()));
   }
   publisher_ = std::move(*publisher);
+  awake_ = publishing.awake;
 
   const Result<runtime::EffortController> effort = runtime::EffortController::create(effort_config(configuration.shed));
   if (!effort.has_value()) throw config::Error(std::string("shed: ") + to_string(effort.error()));
@@ -173,6 +178,10 @@ std::vector<runtime::Missing> Daemon::start(const config::RealTimeConfig& real_t
   threads_.push_back(make("st-frames", real_time.frames, [this] { frames_->run(*pipeline_, stop_capture_); }));
   threads_.push_back(make("st-capture", real_time.capture,
                           [this] { capture(*source_, outlet_, pool_, *vitals_, capture_end_, stop_capture_); }));
+  if (train_) {
+    threads_.push_back(
+        make("st-trigger", real_time.trigger, [this] { give_pulses(*train_, *vitals_, awake_, stop_trigger_); }));
+  }
   // The caller is the service thread. Last: threads inherit.
   const auto of_service = runtime::set_up_this_thread(plan_of("service", real_time.service), mode);
   missing.insert(missing.end(), of_service.begin(), of_service.end());
@@ -184,6 +193,7 @@ std::vector<runtime::Missing> Daemon::start(const config::RealTimeConfig& real_t
   if (missing_before || !missing.empty()) publisher_->say_always(telemetry::kHealthNotRealTime);
   if (recorder_) recorder_->begin();
   for (const auto& thread : threads_) thread->begin();
+  if (pwm_) pwm_->start();
   return missing;
 }
 
@@ -204,20 +214,34 @@ void Daemon::tend(MonotonicTime now) {
   inputs_.take(box_.get());
   inputs_.tend(now);
   vitals_->inputs_gone.set(static_cast<std::uint64_t>(std::popcount(inputs_.gone())));
-  const gpio::LineBits failing = lines_.failing();
-  outputs_care_.tell(
-      failing, [this](std::size_t i) { return to_string(lines_.name(i)); }, std::strerror(lines_.last_error()), now);
-  const gpio::LineBits gone = lines_.gone();
-  // Where nothing is gone it frees what was given up, and does nothing else.
-  if (!outputs_care_.is_due(gone, now) && gone != 0) return;
-  std::string why;
-  (void)lines_.reopen(&why);
-  if (!why.empty()) outputs_care_.cannot(why);
+  look_after(lines_, outputs_care_, now);
+  if (train_) look_after(train_->lines(), train_care_, now);
 }
 
-bool Daemon::make_lines_safe() noexcept { return lines_.hold_safe(); }
+void Daemon::look_after(gpio::OutputLines& lines, LineCare& care, MonotonicTime now) {
+  care.tell(
+      lines.failing(), [&](std::size_t i) { return to_string(lines.name(i)); }, std::strerror(lines.last_error()), now);
+  const gpio::LineBits gone = lines.gone();
+  // Where nothing is gone it frees what was given up, and does nothing else.
+  if (!care.is_due(gone, now) && gone != 0) return;
+  std::string why;
+  (void)lines.reopen(&why);
+  if (!why.empty()) care.cannot(why);
+}
+
+bool Daemon::make_lines_safe() noexcept {
+  // What people may stand beside first.
+  const bool outputs = lines_.hold_safe();
+  const bool pulses = !train_ || train_->lines().hold_safe();
+  const bool pwm = !pwm_ || pwm_->hold_safe();
+  return outputs && pulses && pwm;
+}
 
 bool Daemon::stop() noexcept {
+  stop_trigger_.store(true, std::memory_order_relaxed);
+  if (pwm_ && !pwm_->stop()) {
+    log(LogLevel::kError, "PWM " + pwm_->name() + ": does not stop", {{"STEREOTRACK_CAUSE", "trigger"}});
+  }
   stop_capture_.store(true, std::memory_order_relaxed);
   pool_.close();
   stop_publisher_.store(true, std::memory_order_relaxed);
@@ -225,11 +249,12 @@ bool Daemon::stop() noexcept {
   stop_recorder_.store(true, std::memory_order_relaxed);
   for (const auto& thread : threads_) thread->join();
   threads_.clear();
-  // The publisher could not drive a chip that was gone and may be back: its lines are requested in their safe states.
-  if (lines_.gone() != 0) {
+  // Their threads could not drive a chip that was gone and may be back: its lines are requested in their safe states.
+  for (gpio::OutputLines* lines : {&lines_, train_ ? &train_->lines() : nullptr}) {
+    if (lines == nullptr || lines->gone() == 0) continue;
     try {
-      (void)lines_.reopen();
-      (void)lines_.set_safe(runtime::monotonic_now());
+      (void)lines->reopen();
+      (void)lines->set_safe(runtime::monotonic_now());
     } catch (const std::bad_alloc&) {
       log(LogLevel::kError, "GPIO outputs: no memory to ask for a chip that was gone: its lines stay as they are",
           {{"STEREOTRACK_CAUSE", "line"}});

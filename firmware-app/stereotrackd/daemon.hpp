@@ -11,6 +11,8 @@
 #include "drivers/gpio/line.hpp"
 #include "drivers/record/black_box.hpp"
 #include "drivers/telemetry/authentication.hpp"
+#include "drivers/trigger/pulse_train.hpp"
+#include "drivers/trigger/pwm.hpp"
 #include "firmware-app/runtime/large_pages.hpp"
 #include "firmware-app/runtime/real_time.hpp"
 #include "firmware-app/stereotrackd/capture_rt.hpp"
@@ -24,7 +26,8 @@
 
 namespace stereotrack::daemon {
 
-/// Three threads around one source, one pipeline, one publisher, and one that writes recordings:
+/// Three threads around one source, one pipeline, one publisher, one that writes recordings, and one that gives the
+/// cameras' pulses where there are any to give:
 ///
 ///     capture: LiveSource -> PairOutlet -> FramePool -> frames: Pipeline -> OutcomeMailbox -> publisher:
 ///     OutputSchedule
@@ -39,6 +42,8 @@ class Daemon {
     double unit_m = 0;                                     ///< 0: not known
     std::unique_ptr<capture::LiveSource> source;
     std::unique_ptr<Plan> plan;
+    std::unique_ptr<trigger::PulseTrain> train;  ///< null: there is no trigger thread
+    std::unique_ptr<trigger::Pwm> pwm;           ///< null: none
     gpio::OutputLines lines;
     Inputs inputs;
     std::uint64_t session = 0;
@@ -54,14 +59,15 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
   ~Daemon();
 
-  /// Begins; the caller's thread is the service thread from now on. What the threads were not granted; with
+  /// Begins, pulses last; the caller's thread is the service thread from now on. Throws std::runtime_error where PWM
+  /// refuses to. What the threads were not granted; with
   /// RealTimeMode::kOff nothing is asked for, with kEnforce nothing has begun if anything is missing. If anything is,
   /// here or before (`missing_before`), the health of all that leaves says so.
   [[nodiscard]] std::vector<runtime::Missing> start(const config::RealTimeConfig& real_time, bool missing_before);
 
-  /// Ends the threads; the lines are in their safe states then, a chip that is gone aside. Takes up to 0.1 s, or
-  /// latency.lead_ms. A recording that is being written is given up. False: the recorder hangs in a write to its disk
-  /// and still runs: the destructor would wait for it.
+  /// Ends the threads; the trigger's line is inactive, and the lines are in their safe states then, a chip that is gone
+  /// aside. Takes up to 0.1 s, or latency.lead_ms. A recording that is being written is given up. False: the recorder
+  /// hangs in a write to its disk and still runs: the destructor would wait for it.
   bool stop() noexcept;
 
   /// The source has ended or failed, and all that it gave has left.
@@ -101,18 +107,24 @@ class Daemon {
   [[nodiscard]] capture::FramePool::Counters pool() const noexcept { return pool_.counters(); }
   [[nodiscard]] const gpio::OutputLines& lines() const noexcept { return lines_; }
   [[nodiscard]] const capture::SourceInfo& source() const noexcept { return source_->info(); }
+  /// Null: there is no trigger thread.
+  [[nodiscard]] const trigger::PulseTrain* train() const noexcept { return train_.get(); }
   [[nodiscard]] capture::SourceFigures figures() const noexcept { return source_->figures(); }
   [[nodiscard]] const MemoryUse& memory() const noexcept { return pipeline_->memory(); }
   [[nodiscard]] std::uint64_t lost_notices() const noexcept { return notices_.refused(); }
 
  private:
   void record();
+  static void look_after(gpio::OutputLines& lines, LineCare& care, MonotonicTime now);
 
   std::unique_ptr<Vitals> vitals_;
   std::unique_ptr<capture::LiveSource> source_;
+  std::unique_ptr<trigger::PulseTrain> train_;
+  std::unique_ptr<trigger::Pwm> pwm_;
   gpio::OutputLines lines_;
   Inputs inputs_;
   LineCare outputs_care_{"GPIO outputs"};
+  LineCare train_care_{"GPIO output of the trigger"};
   std::unique_ptr<telemetry::Signer> signer_;
   capture::FramePool pool_;
   capture::PairOutlet::Notices notices_;
@@ -126,7 +138,9 @@ class Daemon {
   std::unique_ptr<record::BlackBox> box_;
 
   CaptureEnd capture_end_;
+  std::chrono::nanoseconds awake_{0};
   std::atomic<bool> stop_capture_{false};
+  std::atomic<bool> stop_trigger_{false};
   std::atomic<bool> stop_publisher_{false};
   std::atomic<bool> stop_recorder_{false};
   std::vector<std::unique_ptr<runtime::Thread>> threads_;

@@ -8,6 +8,7 @@
 
 #include "config/error.hpp"
 #include "config/milliseconds.hpp"
+#include "firmware-app/signals/set_up.hpp"
 
 namespace stereotrack::daemon {
 
@@ -20,25 +21,6 @@ gpio::InputLines open(const Inputs::Setup& setup) {
   std::vector<gpio::InputSpec> specs;
   for (const Inputs::Input& input : setup.inputs) specs.push_back(input.spec);
   return gpio::open_inputs(specs, kConsumer);
-}
-
-gpio::Edges edges_of(config::InputEdge edge) {
-  switch (edge) {
-    case config::InputEdge::kRising: return gpio::Edges::kRising;
-    case config::InputEdge::kFalling: return gpio::Edges::kFalling;
-    case config::InputEdge::kBoth: break;
-  }
-  return gpio::Edges::kBoth;
-}
-
-gpio::Bias bias_of(config::InputBias bias) {
-  switch (bias) {
-    case config::InputBias::kAsIs: break;
-    case config::InputBias::kNone: return gpio::Bias::kNone;
-    case config::InputBias::kPullUp: return gpio::Bias::kPullUp;
-    case config::InputBias::kPullDown: return gpio::Bias::kPullDown;
-  }
-  return gpio::Bias::kAsIs;
 }
 
 }  // namespace
@@ -141,8 +123,8 @@ Inputs::Setup input_setup(const config::Configuration& configuration) {
       input.name = said.name;
       input.spec = {.name = gpio::parse_line_name(said.line),
                     .active_low = said.active == config::ActiveLevel::kLow,
-                    .bias = bias_of(said.bias),
-                    .edges = edges_of(said.edge),
+                    .bias = signals::bias_of(said.bias),
+                    .edges = signals::edges_of(said.edge),
                     .debounce = std::chrono::microseconds(std::llround(said.debounce_ms * 1e3))};
       input.apart = config::from_ms(said.apart_ms);
       gpio::check_inputs({&input.spec, 1});

@@ -15,6 +15,7 @@
 #include "drivers/telemetry/session_file.hpp"
 #include "firmware-app/rig/cameras.hpp"
 #include "firmware-app/rig/rig.hpp"
+#include "firmware-app/rig/trigger.hpp"
 #include "firmware-app/runtime/real_time.hpp"
 #include "firmware-app/signals/set_up.hpp"
 #include "firmware-app/stereotrackd/daemon.hpp"
@@ -69,7 +70,7 @@ void read_rig_calibration(Rig& rig, bool stereo) {
   if (!file.empty() && stereo) read_calibration(file, {}, rig);
 }
 
-std::unique_ptr<capture::LiveSource> open_live_cameras(Rig& rig, bool check) {
+std::unique_ptr<capture::LiveSource> open_live_cameras(Rig& rig, bool check, daemon::Daemon::Parts& parts) {
   const config::CameraConfig& camera = rig.configuration().camera;
   const bool stereo = camera.side_by_side || !camera.right.device.empty();
   if (stereo && rig.configuration().calibration.file.empty()) {
@@ -81,23 +82,28 @@ std::unique_ptr<capture::LiveSource> open_live_cameras(Rig& rig, bool check) {
   if (check) {
     const CameraCheck found = check_cameras(rig.loaded);
     for (const std::string& line : found.lines) std::cout << line << '\n';
+    std::cout << check_trigger(rig.configuration()) << '\n';
     for (const std::string& note : found.notes) log(LogLevel::kWarning, note, {{"STEREOTRACK_CAUSE", "camera"}});
     for (std::size_t i = 1; i < found.failures.size(); ++i) log(LogLevel::kError, found.failures[i]);
     if (!found.failures.empty()) throw std::runtime_error(found.failures[0]);
     source = std::make_unique<Unopened>(found.info);
   } else {
-    source = open_cameras(rig.loaded, [](const std::string& note) {
-      log(LogLevel::kWarning, note, {{"STEREOTRACK_CAUSE", "camera"}});
-    });
+    // Requested inactive; pulses begin with the threads.
+    TriggerSetup trigger = open_trigger(rig.configuration());
+    parts.train = std::move(trigger.train);
+    parts.pwm = std::move(trigger.pwm);
+    const auto say = [](const std::string& note) { log(LogLevel::kWarning, note, {{"STEREOTRACK_CAUSE", "camera"}}); };
+    source = open_cameras(rig.loaded, say, std::move(trigger.told));
   }
   check_rig(rig, source->info());
   return source;
 }
 
-// Opens what source.name says; the film of it is drawn into memory, unless it is only to be checked.
-std::unique_ptr<capture::LiveSource> open_source(Rig& rig, bool check) {
+// Opens what source.name says, and of cameras their trigger, into `parts`; the film of it is drawn into memory, unless
+// it is only to be checked.
+std::unique_ptr<capture::LiveSource> open_source(Rig& rig, bool check, daemon::Daemon::Parts& parts) {
   const config::SourceConfig& source = rig.configuration().source;
-  if (source.name == kCameras) return open_live_cameras(rig, check);
+  if (source.name == kCameras) return open_live_cameras(rig, check, parts);
   if (source.name.starts_with(kSynthetic)) {
     open_scene(source.name, rig);
   } else if (record::is_recording(source.name)) {
@@ -164,9 +170,19 @@ std::string summary_of(const capture::SourceInfo& info, const config::Configurat
 
 int make_lines_safe(const config::Configuration& configuration) {
   bool all = true;
-  for (const gpio::SafeOutcome& outcome : gpio::set_lines_safe(signals::line_specs(configuration), "stereotrackd")) {
+  std::vector<gpio::LineSpec> lines = signals::line_specs(configuration);
+  if (const auto pulses = trigger_output(configuration)) lines.push_back(*pulses);
+  for (const gpio::SafeOutcome& outcome : gpio::set_lines_safe(lines, "stereotrackd")) {
     log(outcome.done ? LogLevel::kInfo : LogLevel::kError, outcome.text, {{"STEREOTRACK_CAUSE", "line"}});
     all = all && outcome.done;
+  }
+  if (const auto pwm = trigger_pwm(configuration)) {
+    try {
+      log(LogLevel::kInfo, trigger::set_pwm_safe(*pwm), {{"STEREOTRACK_CAUSE", "trigger"}});
+    } catch (const std::runtime_error& error) {
+      log(LogLevel::kError, error.what(), {{"STEREOTRACK_CAUSE", "trigger"}});
+      all = false;
+    }
   }
   return all ? 0 : kFailed;
 }
@@ -217,7 +233,7 @@ int run(const Arguments& arguments) {
   }
   const daemon::Inputs::Setup inputs = daemon::input_setup(configuration);
   parts.configuration = &configuration;
-  parts.source = open_source(rig, arguments.check);
+  parts.source = open_source(rig, arguments.check, parts);
   parts.calibration = rig.calibration && parts.source->info().stereo ? &*rig.calibration : nullptr;
   parts.unit_m = rig.unit_m;
   parts.plan = daemon::make_plan(configuration, rig.unit_m);

@@ -108,7 +108,10 @@ void add_cameras(Text& text, const capture::SourceFigures& figures) {
 
   if (figures.has_trigger) {
     text.counter("trigger_pulses_total", "Number of the last pulse that was told.", figures.pulses);
+    text.counter("trigger_pulses_lost_total", "Pulses that are known to have been, and were not told.",
+                 figures.pulses_lost);
     text.gauge("trigger_silent", "1: frames come, and no pulses.", figures.trigger_silent ? 1 : 0);
+    text.gauge("trigger_unanswered", "1: frames come, and answer no pulse.", figures.trigger_unanswered ? 1 : 0);
     text.family("camera_exposures_total", "counter", "Exposures that do not fit the pulses, by reason.");
     of_each(",fault=\"missed\"", &F::missed);
     of_each(",fault=\"doubled\"", &F::doubled);
@@ -157,6 +160,14 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
   text.counter("notices_lost_total", "Pairs of which the publisher was not told.", daemon.lost_notices());
 
   if (const capture::SourceFigures figures = daemon.figures(); figures.of_cameras) add_cameras(text, figures);
+  if (const trigger::PulseTrain* train = daemon.train()) {
+    text.family("trigger_train_total", "counter", "Pulses of ours by what became of them; failed: the line refused.");
+    text.value("{fate=\"given\"}", train->counters().given.get());
+    text.value("{fate=\"skipped\"}", train->counters().skipped.get());
+    text.value("{fate=\"failed\"}", train->counters().failed.get());
+    text.summary("trigger_wake_up_seconds", "How late the trigger thread woke for a pulse.", vitals.trigger_wake_up);
+    text.summary("trigger_set_seconds", "From when a pulse was due to its line's being set.", vitals.trigger_set);
+  }
   text.counter("skew_over_total", "Pairs further apart than camera.skew_limit_ms.", vitals.skew_over.get());
   text.gauge("skew_max_microseconds", "Largest distance of the two exposures of a pair.", vitals.skew_max_us.get());
   text.counter("exposures_differ_total", "Pairs exposed differently, over camera.exposure_limit_percent.",
@@ -179,6 +190,7 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
   text.value("{thread=\"capture\"}", vitals.capture_allocations.get());
   text.value("{thread=\"frames\"}", vitals.frame_allocations.get());
   text.value("{thread=\"publisher\"}", vitals.publisher_allocations.get());
+  text.value("{thread=\"trigger\"}", vitals.trigger_allocations.get());
 
   text.family("effort_left_out", "gauge", "1: frames do without it now.");
   for (std::size_t i = 0; i < kEfforts; ++i) {
@@ -214,6 +226,7 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
   text.family("gpio_chips_lost_total", "counter", "Times that a GPIO chip went away.");
   text.value("{lines=\"outputs\"}", daemon.lines().outages());
   text.value("{lines=\"inputs\"}", daemon.inputs().outages());
+  if (daemon.train() != nullptr) text.value("{lines=\"trigger\"}", daemon.train()->lines().outages());
   inputs_text(daemon.inputs(), text);
 
   if (const record::BlackBox* box = daemon.black_box()) {

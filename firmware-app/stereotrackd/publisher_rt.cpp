@@ -309,7 +309,7 @@ void Publisher::judge_health() noexcept {
   cameras_ = source_.figures();
   tell_if(cameras_.cameras[0].silent, telemetry::kHealthLeftSilent);
   tell_if(cameras_.cameras[1].silent, telemetry::kHealthRightSilent);
-  tell_if(cameras_.trigger_silent, telemetry::kHealthTriggerFailed);
+  tell_if(cameras_.trigger_silent || cameras_.trigger_unanswered || trigger_fails(), telemetry::kHealthTriggerFailed);
   tell_if(vitals_.skew_over.get() != skew_over_seen_, telemetry::kHealthSkew);
   tell_if(vitals_.exposures_differ.get() != exposures_differ_seen_, telemetry::kHealthExposuresDiffer);
   skew_over_seen_ = vitals_.skew_over.get();
@@ -329,6 +329,13 @@ void Publisher::judge_health() noexcept {
   vitals_.health.set(health);
 }
 
+/// Pulses of ours that were not given since the last time.
+bool Publisher::trigger_fails() noexcept {
+  if (config_.train == nullptr) return false;
+  const std::uint64_t now = config_.train->skipped.get() + config_.train->failed.get();
+  return std::exchange(trigger_failures_seen_, now) != now;
+}
+
 void Publisher::send_status(MonotonicTime now) noexcept {
   judge_health();
   const capture::FramePool::Counters pool = pool_.counters();
@@ -346,6 +353,18 @@ void Publisher::send_status(MonotonicTime now) noexcept {
   status.pairs_starved = pool.starved;
   status.unpaired_left = cameras_.missing_right;
   status.unpaired_right = cameras_.missing_left;
+  status.trigger_pulses = cameras_.pulses;
+  if (config_.train != nullptr) {
+    status.trigger_pulses = config_.train->given.get();
+    status.trigger_skipped = config_.train->skipped.get();
+    status.trigger_failed = config_.train->failed.get();
+  }
+  status.exposures_missed_left = cameras_.cameras[0].missed;
+  status.exposures_missed_right = cameras_.cameras[1].missed;
+  status.exposures_doubled_left = cameras_.cameras[0].doubled;
+  status.exposures_doubled_right = cameras_.cameras[1].doubled;
+  status.exposures_stray_left = cameras_.cameras[0].stray;
+  status.exposures_stray_right = cameras_.cameras[1].stray;
   status.skew_max_us = narrow(vitals_.skew_max_us.get());
   status.outputs_on_time = outputs.on_time;
   status.outputs_predicted = outputs.predicted_late + outputs.predicted_superseded;

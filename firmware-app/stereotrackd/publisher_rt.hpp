@@ -13,6 +13,7 @@
 #include "drivers/record/black_box.hpp"
 #include "drivers/telemetry/encoder.hpp"
 #include "drivers/telemetry/sink.hpp"
+#include "drivers/trigger/pulse_train.hpp"
 #include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/runtime/output_schedule.hpp"
 #include "firmware-app/signals/signal_rules.hpp"
@@ -47,8 +48,9 @@ class Publisher {
     std::chrono::nanoseconds late_after{0};   ///< what leaves later than due by more has missed its deadline
     std::chrono::nanoseconds awake{0};        ///< before a slot leaves, not asleep: runtime::sleep_until()
     std::size_t pool_slots = 0;
-    std::chrono::nanoseconds skew_limit{0};  ///< of a pair; 0: none
-    double exposure_limit = 0;               ///< of the longer exposure, by which the shorter may differ; 0: none
+    const trigger::PulseTrain::Counters* train = nullptr;  ///< of pulses that we give; null: none
+    std::chrono::nanoseconds skew_limit{0};                ///< of a pair; 0: none
+    double exposure_limit = 0;  ///< of the longer exposure, by which the shorter may differ; 0: none
   };
 
   /// The plan, lines and all that is referred to outlive it. Faults of the schedule: kBadConfig.
@@ -105,6 +107,7 @@ class Publisher {
   void send(std::span<const std::byte> datagram) noexcept;
   void send_status(MonotonicTime now) noexcept;
   void judge_health() noexcept;
+  [[nodiscard]] bool trigger_fails() noexcept;
   void drive(gpio::LineBits lines, MonotonicTime now) noexcept;
   void tell() noexcept;
   [[nodiscard]] telemetry::Live live_of(const Output* output) const noexcept;
@@ -150,6 +153,7 @@ class Publisher {
   std::uint64_t unused_told_ = 0;
   std::uint64_t recordings_seen_ = 0;
   std::uint64_t skew_over_seen_ = 0;
+  std::uint64_t trigger_failures_seen_ = 0;
   std::uint64_t exposures_differ_seen_ = 0;
   capture::SourceFigures cameras_;  ///< at the last judgement
   std::uint64_t lines_failed_seen_ = 0;

@@ -84,9 +84,10 @@ bool Service::take_signals() {
 void Service::feed_watchdog(const Daemon& daemon) {
   if (!watchdog_ || Clock::now() - fed_ < *watchdog_ / 3) return;
   const Vitals& vitals = daemon.vitals();
-  const std::array<std::uint64_t, 3> now{vitals.capture_beats.get(), vitals.frame_beats.get(),
-                                         vitals.publisher_beats.get()};
-  for (std::size_t i = 0; i < now.size(); ++i) {
+  const std::array<std::uint64_t, 4> now{vitals.capture_beats.get(), vitals.frame_beats.get(),
+                                         vitals.publisher_beats.get(), vitals.trigger_beats.get()};
+  const std::size_t threads = daemon.train() == nullptr ? 3 : 4;
+  for (std::size_t i = 0; i < threads; ++i) {
     if (now[i] == beats_[i]) return;  // not fed: systemd restarts the daemon if that goes on
   }
   beats_ = now;
@@ -130,6 +131,13 @@ void Service::log_changes(const Daemon& daemon) {
   if (const std::uint64_t by = changed(telemetry_failed_, vitals.telemetry_failed.get()); by > 0) {
     log(LogLevel::kWarning, std::to_string(by) + " datagrams found no way in the last second",
         {{"STEREOTRACK_CAUSE", "telemetry"}});
+  }
+  if (const trigger::PulseTrain* train = daemon.train()) {
+    if (const std::uint64_t by = changed(pulses_skipped_, train->counters().skipped.get()); by > 0) {
+      log(LogLevel::kWarning,
+          "trigger: " + std::to_string(by) + " pulses in the last second were slept over and are skipped",
+          {{"STEREOTRACK_CAUSE", "trigger"}, {"STEREOTRACK_COUNT", std::to_string(by)}});
+    }
   }
   if (const record::BlackBox* box = daemon.black_box()) {
     const record::BlackBox::Counters& counters = box->counters();

@@ -19,7 +19,8 @@ namespace stereotrack::daemon {
 /// logs what the counters say, serves figures, tells systemd that the daemon is ready and alive. It may block, allocate
 /// and throw; nothing waits for it.
 ///
-/// The watchdog is fed only while all three threads go round: their beats must have risen since the last time.
+/// The watchdog is fed only while all three threads, and the trigger's, go round: their beats must have risen since the
+/// last time.
 class Service {
  public:
   struct Config {
@@ -55,13 +56,14 @@ class Service {
   bool metrics_file_failed_ = false;
   std::optional<std::chrono::microseconds> watchdog_;
   Clock::time_point fed_{};
-  std::array<std::uint64_t, 3> beats_{};
+  std::array<std::uint64_t, 4> beats_{};
   std::array<std::uint64_t, kScheduleCounters.size()> schedule_{};
   std::uint64_t efforts_ = 0;
   std::uint64_t health_ = 0;
   std::uint64_t allocations_ = 0;
   std::uint64_t telemetry_failed_ = 0;
   std::uint64_t frames_refused_ = 0;
+  std::uint64_t pulses_skipped_ = 0;
   std::uint64_t recordings_ = 0;
   std::uint64_t recordings_lost_ = 0;
 };

@@ -44,6 +44,12 @@ struct Vitals {
   Counter capture_beats;
   Counter capture_allocations;  ///< heap calls after warm-up
 
+  // ---- Trigger thread, with trigger.mode = gpio; what it gave: trigger::PulseTrain::Counters
+  Counter trigger_beats;
+  Counter trigger_allocations;         ///< heap calls after warm-up
+  runtime::Histogram trigger_wake_up;  ///< how late it woke for a pulse
+  runtime::Histogram trigger_set;      ///< from when a pulse was due to its line's being set
+
   // ---- Frame loop
   Counter frame_beats;
   Counter frames;                        ///< pairs that went through the pipeline
@@ -89,7 +95,8 @@ struct Vitals {
 
   /// Of all real-time threads.
   [[nodiscard]] std::uint64_t allocations() const noexcept {
-    return capture_allocations.get() + frame_allocations.get() + publisher_allocations.get();
+    return capture_allocations.get() + frame_allocations.get() + publisher_allocations.get() +
+           trigger_allocations.get();
   }
 };
 

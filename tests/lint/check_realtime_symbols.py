@@ -30,6 +30,7 @@ ROOTS_OF_THREADS = [
     "stereotrack::daemon::capture(",
     "stereotrack::daemon::FrameLoop::run(",
     "stereotrack::daemon::Publisher::run(",
+    "stereotrack::daemon::give_pulses(",
     # Through a table, or a pointer.
     "stereotrack::daemon::FrameLoop::stage_ended(",
     "stereotrack::capture::Film::step(",
@@ -48,9 +49,13 @@ ROOTS_OF_THREADS = [
     "stereotrack::capture::v4l2::Stream::give_back(",
     "stereotrack::capture::v4l2::Stream::picture(",
     "stereotrack::capture::v4l2::Stream::counters(",
+    "stereotrack::trigger::PulseTrain::Told::take(",
+    "stereotrack::trigger::EdgeTrigger::take(",
     "stereotrack::telemetry::UdpSender::send(",
     "stereotrack::gpio::gpiod::(anonymous namespace)::Request::set(",
     "stereotrack::gpio::simulated_chip::(anonymous namespace)::Request::set(",
+    "stereotrack::gpio::gpiod::(anonymous namespace)::Inputs::read(",
+    "stereotrack::gpio::gpiod::(anonymous namespace)::Inputs::probe(",
 ]
 
 # Demangled names in full.
@@ -79,6 +84,10 @@ THREADS = [
     r"stereotrack_Datagram_msg",                          # its table of the schema
     r"crypto_generichash",  # libsodium: no heap
     r"gpiod_line_set_value_bulk|gpiod_line_request_set_values",  # one ioctl
+    r"poll|epoll_ctl",  # edges of an external trigger: poll with no wait
+    r"gpiod_line_event_read_multiple|gpiod_line_get_value",  # one read, one ioctl
+    r"gpiod_line_request_(wait|read)_edge_events?|gpiod_line_request_get_values_subset",  # the same of libgpiod 2
+    r"gpiod_edge_event_(buffer_get_event|get_[a-z_]+)",  # of a buffer that is there
 ]
 
 SHF_ALLOC = 2

@@ -29,21 +29,31 @@ class CameraScene {
         right_(info("right-device", format, period)) {}
   CameraScene(const CameraScene&) = delete;
   CameraScene& operator=(const CameraScene&) = delete;
-  ~CameraScene() {
-    stop_.store(true);
-    if (thread_.joinable()) thread_.join();
-  }
+  ~CameraScene() { stop(); }
 
   /// The source, and frames from now on, from that one of the scene on.
   [[nodiscard]] std::unique_ptr<capture::StereoCameras> open(int first) {
-    capture::StereoCameras::Config config;
-    config.timeout = std::chrono::milliseconds(300);
-    config.back_off_first = std::chrono::milliseconds(50);
-    auto source = std::make_unique<capture::StereoCameras>(
-        [this](Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config);
+    auto source = make({});
     thread_ = std::thread([this, first] { expose(first); });
     return source;
   }
+  /// The same with frames that are exposed when `pulses` ask for them, exactly kDelay after, however late threads are.
+  [[nodiscard]] std::unique_ptr<capture::StereoCameras> open_triggered(int first,
+                                                                       std::unique_ptr<trigger::Trigger> pulses) {
+    auto relay = std::make_unique<Relay>();
+    Relay& told = *relay;
+    auto source = make(std::move(relay));
+    pulses_ = std::move(pulses);
+    thread_ = std::thread([this, first, &told] { answer(first, told); });
+    return source;
+  }
+  /// Ends the thread that exposes: before the source, where it was opened triggered.
+  void stop() {
+    stop_.store(true);
+    if (thread_.joinable()) thread_.join();
+  }
+  /// The next pulse finds the right camera asleep.
+  void miss_one() { misses_.store(true); }
 
   void unplug(Side side) {
     sensor(side).refuse(sensor(side).info().name + ": is not there");
@@ -52,11 +62,32 @@ class CameraScene {
   void plug_in(Side side) { sensor(side).refuse(""); }
   void set_skew(std::chrono::nanoseconds skew) { skew_ns_.store(skew.count()); }
   void set_right_exposure(std::chrono::nanoseconds exposure) { right_exposure_ns_.store(exposure.count()); }
+  static constexpr std::chrono::nanoseconds kDelay = std::chrono::microseconds(300);
   static constexpr std::chrono::nanoseconds kLeftExposure = std::chrono::milliseconds(4);
 
   [[nodiscard]] SensorScript& sensor(Side side) { return side == Side::kLeft ? left_ : right_; }
 
  private:
+  /// Pulses to the capture thread, and then their frames.
+  class Relay final : public trigger::Trigger {
+   public:
+    void tell(const Pulse& pulse) { (void)queue_.push(pulse); }
+    [[nodiscard]] int descriptor() const noexcept override { return -1; }
+    [[nodiscard]] bool take(Pulse& pulse) noexcept override { return queue_.pop(pulse); }
+
+   private:
+    HandoverQueue<Pulse, 64> queue_;
+  };
+
+  [[nodiscard]] std::unique_ptr<capture::StereoCameras> make(std::unique_ptr<trigger::Trigger> trigger) {
+    capture::StereoCameras::Config config;
+    config.timeout = std::chrono::milliseconds(300);
+    config.back_off_first = std::chrono::milliseconds(50);
+    config.pulse_delay = kDelay;
+    return std::make_unique<capture::StereoCameras>(
+        [this](Side side) { return std::make_unique<ScriptedCamera>(sensor(side)); }, config, std::move(trigger));
+  }
+
   static capture::CameraInfo info(const char* name, const SceneFormat& format, std::chrono::nanoseconds period) {
     return {.name = name,
             .model = "scripted",
@@ -74,23 +105,41 @@ class CameraScene {
     for (int i = 1; !stop_.load(); ++i) {
       const auto moment = begin + period_ * i;
       std::this_thread::sleep_until(moment);
-      const int frame = (first + i - 2) % MovingScene::kFrames + 1;
-      const FramePair pair = scene.pair(frame, true);
-      const std::chrono::nanoseconds time = moment.time_since_epoch();
-      const auto number = static_cast<std::uint64_t>(i);
-      const auto show = [](const Picture& picture) {
-        return [&picture](std::uint8_t* pixels, std::uint64_t) {
-          std::copy_n(picture.data, picture_bytes(picture.format, picture.width, picture.height), pixels);
-        };
-      };
-      (void)left_.expose({.number = number, .time = time, .sequence = number, .settings = {kLeftExposure, 1.0F}},
-                         show(pair.left));
-      (void)right_.expose({.number = number,
-                           .time = time + std::chrono::nanoseconds(skew_ns_.load()),
-                           .sequence = number,
-                           .settings = {std::chrono::nanoseconds(right_exposure_ns_.load()), 1.0F}},
-                          show(pair.right));
+      show(scene, first, i, moment.time_since_epoch(), true);
     }
+  }
+
+  void answer(int first, Relay& told) {
+    MovingScene scene(format_);
+    trigger::Trigger::Pulse pulse;
+    for (int i = 1; !stop_.load();) {
+      if (!pulses_->take(pulse)) {
+        std::this_thread::sleep_for(std::chrono::microseconds(500));
+        continue;
+      }
+      told.tell(pulse);
+      show(scene, first, i++, pulse.time.time_since_epoch() + kDelay + kLeftExposure / 2, !misses_.exchange(false));
+    }
+  }
+
+  /// The i-th exposure, from 1, whose middle is at `time`.
+  void show(MovingScene& scene, int first, int i, std::chrono::nanoseconds time, bool with_right) {
+    const int frame = (first + i - 2) % MovingScene::kFrames + 1;
+    const FramePair pair = scene.pair(frame, true);
+    const auto number = static_cast<std::uint64_t>(i);
+    const auto paint = [](const Picture& picture) {
+      return [&picture](std::uint8_t* pixels, std::uint64_t) {
+        std::copy_n(picture.data, picture_bytes(picture.format, picture.width, picture.height), pixels);
+      };
+    };
+    (void)left_.expose({.number = number, .time = time, .sequence = number, .settings = {kLeftExposure, 1.0F}},
+                       paint(pair.left));
+    if (!with_right) return;
+    (void)right_.expose({.number = number,
+                         .time = time + std::chrono::nanoseconds(skew_ns_.load()),
+                         .sequence = number,
+                         .settings = {std::chrono::nanoseconds(right_exposure_ns_.load()), 1.0F}},
+                        paint(pair.right));
   }
 
   const SceneFormat& format_;
@@ -100,6 +149,8 @@ class CameraScene {
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> skew_ns_{0};
   std::atomic<std::int64_t> right_exposure_ns_{kLeftExposure.count()};
+  std::atomic<bool> misses_{false};
+  std::unique_ptr<trigger::Trigger> pulses_;
   std::thread thread_;
 };
 

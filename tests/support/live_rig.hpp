@@ -76,13 +76,14 @@ class Ear {
 struct LiveRig {
   explicit LiveRig(std::unique_ptr<capture::LiveSource> source, const std::vector<std::string>& set = {},
                    StageObserver also = {}, std::vector<gpio::LineSpec> lines = {},
-                   std::vector<signals::Signal> wanted = {})
+                   std::vector<signals::Signal> wanted = {}, std::unique_ptr<trigger::PulseTrain> train = {})
       : configuration(configured(set)), calibration(MovingScene::calibration()) {
     daemon::Daemon::Parts parts;
     parts.configuration = &configuration;
     parts.calibration = &calibration;
     parts.unit_m = 1;
     parts.source = std::move(source);
+    parts.train = std::move(train);
     parts.plan = std::make_unique<daemon::Plan>(
         daemon::Plan{std::make_unique<telemetry::UdpSender>(ear.here()), rules_of(std::move(wanted)), 0});
     parts.lines = gpio::open_lines(lines, "test");

@@ -354,6 +354,23 @@ TEST(Stereotrackd, DrivesItsLinesSafeAfterACrash) {
   EXPECT_NE(done.err.find("/dev/nochip"), std::string::npos) << done.err;
 }
 
+TEST(Stereotrackd, StopsWhatAskedTheCamerasForExposuresAfterACrash) {
+  const TempDir folder;
+  const std::filesystem::path file = folder.path() / "rig.toml";
+  const auto safe = [&](const std::string& trigger) {
+    std::ofstream(file) << "[source]\nname = \"cameras\"\n[camera]\nleft.device = \"/dev/none\"\n[trigger]\n"
+                        << trigger;
+    return run_program({kDaemon, "--config", file.string(), "--safe-lines"});
+  };
+  const ProgramResult line = safe("mode = \"gpio\"\nline = \"sim:pulses\"\nactive = \"low\"\n");
+  EXPECT_EQ(line.exit_code, 0) << line.err;
+  EXPECT_NE(line.err.find("sim:pulses: driven inactive, its safe state (high)"), std::string::npos) << line.err;
+  const ProgramResult pwm = safe("mode = \"pwm\"\npwm_chip = \"no-such.pwm\"\n");
+  EXPECT_EQ(pwm.exit_code, 1);
+  EXPECT_NE(pwm.err.find("PWM no-such.pwm: no such chip"), std::string::npos) << pwm.err;
+  EXPECT_EQ(safe("mode = \"unseen\"\n").exit_code, 0);
+}
+
 std::string http_get(std::uint16_t port) {
   const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};

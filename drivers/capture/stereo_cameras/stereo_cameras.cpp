@@ -58,7 +58,7 @@ SourceInfo source_info(const StereoCameras::Config& config, const CameraInfo& ca
   info.format = camera.format;
   info.stereo = config.stereo || config.side_by_side;
   info.has_time = true;
-  info.period = camera.period;
+  info.period = config.period.count() > 0 ? config.period : camera.period;
   return info;
 }
 
@@ -102,7 +102,8 @@ StereoCameras::StereoCameras(Open open, const Config& config, std::unique_ptr<tr
     if (!wrong.empty()) throw std::runtime_error(wrong);
   }
   if (const std::string wrong = split_refusal(config_, wanted_); !wrong.empty()) throw std::runtime_error(wrong);
-  if (wanted_.period.count() <= 0) {
+  info_ = source_info(config_, wanted_);
+  if (info_.period.count() <= 0) {
     throw std::runtime_error(wanted_.name + ": does not say how many frames a second it delivers: set camera.fps");
   }
   for (const Side side : kSides) {
@@ -118,18 +119,17 @@ StereoCameras::StereoCameras(Open open, const Config& config, std::unique_ptr<tr
     }
   }
   if (!left.camera && !right.camera) throw std::runtime_error(failures[0]);
-  info_ = source_info(config_, wanted_);
-  config_.timeout = std::max(config_.timeout, kLeastTimeoutPeriods * wanted_.period);
-  phase_ = PhaseEstimator(wanted_.period);
+  config_.timeout = std::max(config_.timeout, kLeastTimeoutPeriods * info_.period);
+  phase_ = PhaseEstimator(info_.period);
   const bool sequenced = wanted_.counts_lost && (!right.camera || right.camera->info().counts_lost);
   const auto pairer =
-      trigger::Pairer::create({.period = wanted_.period, .tolerance = config_.tolerance, .sequenced = sequenced});
+      trigger::Pairer::create({.period = info_.period, .tolerance = config_.tolerance, .sequenced = sequenced});
   if (!pairer.has_value()) throw std::runtime_error("camera.tolerance: want more than 0 and at most 0.5");
   pairer_ = *pairer;
   if (trigger_) {
     config_.triggered = true;
     const auto matcher = trigger::PulseMatcher::create(
-        {.period = wanted_.period, .delay = config_.pulse_delay, .tolerance = std::min(config_.tolerance, 0.45)});
+        {.period = info_.period, .delay = config_.pulse_delay, .tolerance = std::min(config_.tolerance, 0.45)});
     if (!matcher.has_value()) throw std::runtime_error("the trigger's delay: want no less than 0");
     matcher_ = *matcher;
   }
@@ -216,6 +216,7 @@ bool StereoCameras::both_count() const noexcept {
 void StereoCameras::trust_pulses(PairOutlet& outlet, bool trust) noexcept {
   if (trust == pulses_trusted_) return;
   pulses_trusted_ = trust;
+  last_answer_ = now();
   // Numbers of pulses and of frames do not compare: what fits has to show anew.
   settle(outlet, pairer_->restart());
   last_pair_ = now();
@@ -227,9 +228,10 @@ void StereoCameras::take_pulses(PairOutlet& outlet) noexcept {
   while (trigger_ && trigger_->take(pulse)) {
     false_alarms_ = 0;
     last_pulse_ = now();
+    if (!armed_) armed_ = last_pair_ = last_pulse_;
     matcher_->pulse(pulse.number, CaptureTime(pulse.time.time_since_epoch()));
     pulses_.set(matcher_->pulses());
-    trust_pulses(outlet, true);
+    if (!trigger_unanswered_.load(std::memory_order_relaxed)) trust_pulses(outlet, true);
     if (!trigger_silent_.load(std::memory_order_relaxed)) continue;
     trigger_silent_.store(false, std::memory_order_relaxed);
     tell(Change::kPulses, Side::kLeft);
@@ -246,6 +248,42 @@ void StereoCameras::look_for_pulses(PairOutlet& outlet, MonotonicTime now) noexc
   trigger_silent_.store(true, std::memory_order_relaxed);
   trust_pulses(outlet, false);
   tell(Change::kNoPulses, Side::kLeft, now - since);
+}
+
+/// Frames come and pulses, and have nothing to do with each other.
+void StereoCameras::look_for_answers(PairOutlet& outlet) noexcept {
+  if (!pulses_trusted_) return;
+  const bool frames_come = std::any_of(eyes_.begin(), eyes_.end(), [&](const Eye& each) {
+    return each.heard && *each.heard - last_answer_ > config_.timeout;
+  });
+  if (!frames_come || last_pulse_ - last_answer_ <= config_.timeout / 2) return;
+  trigger_unanswered_.store(true, std::memory_order_relaxed);
+  answers_in_row_ = 0;
+  tell(Change::kNoAnswers, Side::kLeft, off_);
+  trust_pulses(outlet, false);
+}
+
+/// Whether a frame may go to the pairer, and by which number: that of its pulse, while pulses are trusted.
+bool StereoCameras::answers(PairOutlet& outlet, Side side, CaptureTime mid_exposure, const SensorFrame& frame,
+                            std::uint64_t& sequence) noexcept {
+  const bool unanswered = trigger_unanswered_.load(std::memory_order_relaxed);
+  if (!matcher_ || !(pulses_trusted_ || unanswered)) return true;
+  const CaptureTime begin = mid_exposure - frame.settings.exposure.value_or(config_.exposure) / 2;
+  const trigger::PulseMatcher::Found found = matcher_->frame(side, begin);
+  const bool is_answer = found.kind == trigger::PulseMatcher::Kind::kAnswer;
+  if (!is_answer) off_ = found.off;
+  answers_in_row_ = is_answer ? answers_in_row_ + 1 : 0;
+  if (unanswered) {
+    if (answers_in_row_ < kConvincing) return true;
+    trigger_unanswered_.store(false, std::memory_order_relaxed);
+    tell(Change::kAnswers, Side::kLeft);
+    trust_pulses(outlet, true);
+  }
+  if (is_answer) {
+    last_answer_ = now();
+    sequence = found.number;
+  }
+  return is_answer;
 }
 
 /// The camera is given up: nothing is taken from it any more. Its frames that wait for a partner are handed back.
@@ -372,13 +410,9 @@ void StereoCameras::arrived(PairOutlet& outlet, Side side, const SensorFrame& fr
     (void)distances_.push({time, time - partner.last, false});
 
   std::uint64_t sequence = frame.sequence;
-  if (pulses_trusted_) {
-    const trigger::PulseMatcher::Found found = matcher_->frame(side, time);
-    if (found.kind != trigger::PulseMatcher::Kind::kAnswer) {
-      give_back(side, frame.buffer);
-      return;
-    }
-    sequence = found.number;
+  if (!answers(outlet, side, time, frame, sequence)) {
+    give_back(side, frame.buffer);
+    return;
   }
   settle(outlet, pairer_->push(side, {time, sequence, frame.buffer}));
   if (is_out(other(side))) {
@@ -462,7 +496,7 @@ void StereoCameras::count() noexcept {
     add(each.damaged, each.before.damaged, now.damaged);
     add(each.lost, each.before.lost, now.lost);
     add(each.late, each.before.late, now.late);
-    if (!matcher_) continue;
+    if (!matcher_ || (&each != eyes_.data() && !has_two())) continue;  // nobody misses a camera that is not to be
     const trigger::PulseMatcher::Counters& exposures =
         matcher_->counters(&each == eyes_.data() ? Side::kLeft : Side::kRight);
     each.missed.set(exposures.missed);
@@ -493,6 +527,7 @@ LiveSource::Step StereoCameras::step(PairOutlet& outlet, MonotonicTime until) no
   const MonotonicTime at = now();
   look_for_silence(outlet, at);
   look_for_pulses(outlet, at);
+  look_for_answers(outlet);
   look_for_fits(at);
   retire();
   count();
@@ -541,6 +576,16 @@ void StereoCameras::say(const Event& event, std::vector<SourceNote>& notes) {
       break;
     case Change::kPulses:
       notes.push_back({Weight::kNotice, "trigger_back", "", "trigger: pulses are told again"});
+      break;
+    case Change::kNoAnswers:
+      notes.push_back({Weight::kWarning, "trigger_unanswered", "",
+                       "trigger: no frame answers a pulse, the last one began " +
+                           std::to_string(event.span.count() / 1000) +
+                           " us after the nearest: pairs are formed without: do the cameras follow the trigger, and "
+                           "are trigger.delay_us and trigger.edge theirs?"});
+      break;
+    case Change::kAnswers:
+      notes.push_back({Weight::kNotice, "trigger_answered", "", "trigger: frames answer its pulses again"});
       break;
     case Change::kMatched:
       notes.push_back({Weight::kNotice, "cameras_fit", "", "cameras: left and right pictures fit again"});
@@ -624,6 +669,13 @@ void StereoCameras::tend(std::vector<SourceNote>& notes) {
     reopen(side, notes);
   }
   estimate_phase();
+  if (!trigger_) return;
+  std::vector<trigger::Trigger::Note> of_trigger;
+  trigger_->tend(now(), of_trigger);
+  for (trigger::Trigger::Note& note : of_trigger) {
+    notes.push_back({note.good ? SourceNote::Weight::kNotice : SourceNote::Weight::kWarning,
+                     note.good ? "trigger_line_back" : "trigger_line", "", std::move(note.text)});
+  }
 }
 
 SourceFigures StereoCameras::figures() const noexcept {
@@ -655,7 +707,9 @@ SourceFigures StereoCameras::figures() const noexcept {
   out.waiting_high = pairing_[8].get();
   out.has_trigger = matcher_.has_value();
   out.trigger_silent = trigger_silent_.load(std::memory_order_relaxed);
+  out.trigger_unanswered = trigger_unanswered_.load(std::memory_order_relaxed);
   out.pulses = pulses_.get();
+  out.pulses_lost = trigger_ ? trigger_->lost() : 0;
   out.mono_pairs = mono_pairs_.get();
   out.notes_lost = events_.refused();
   const std::int64_t phase = phase_ns_.load(std::memory_order_relaxed);

@@ -43,6 +43,8 @@ namespace stereotrack::capture {
 /// * with a trigger::Trigger, frames are counted against its pulses, and the number of a frame's pulse is what two must
 ///   have in common: a missed or doubled exposure breaks no pair. Frames that no pulse asked for are given back. While
 ///   no pulse is told and frames come, they pair without;
+/// * no frame answers a pulse for `timeout`: the cameras do not follow the trigger, or with another delay. Frames pair
+///   without pulses, until kConvincing in a row answer one;
 /// * a left frame, whose time is its pair's, bears one after its arrival: told once a camera; no result leaves on time;
 /// * a camera that comes back and delivers another size or format is refused.
 ///
@@ -52,6 +54,7 @@ class StereoCameras final : public LiveSource {
  public:
   static constexpr std::size_t kMostBuffers = 64;             ///< of one camera
   static constexpr std::chrono::milliseconds kStartUp{2000};  ///< over `timeout`, for a camera's first frame
+  static constexpr int kConvincing = 8;                       ///< answers in a row for which pulses are believed again
   static constexpr int kLeastTimeoutPeriods = 4;              ///< a shorter `timeout` is held to so many
 
   /// Opens the camera of that side; called by the constructor, then by tend(). Throws std::runtime_error, one line.
@@ -66,7 +69,9 @@ class StereoCameras final : public LiveSource {
     std::chrono::nanoseconds timeout{std::chrono::milliseconds(500)};
     std::chrono::nanoseconds back_off_first{std::chrono::milliseconds(500)};
     std::chrono::nanoseconds back_off_most{std::chrono::seconds(10)};
-    std::chrono::nanoseconds pulse_delay{0};    ///< from a trigger's pulse to the middle of the exposure it asks for
+    std::chrono::nanoseconds period{0};         ///< of what triggers the cameras; 0: as the cameras tell
+    std::chrono::nanoseconds pulse_delay{0};    ///< from a trigger's pulse to the beginning of the exposure it asks for
+    std::chrono::nanoseconds exposure{0};       ///< of frames whose driver does not tell theirs: for their beginning
     MonotonicTime (*now)() noexcept = nullptr;  ///< null: CLOCK_MONOTONIC. Tests bring a time of their own
   };
 
@@ -97,7 +102,9 @@ class StereoCameras final : public LiveSource {
     kUnmatched,
     kMatched,
     kNoPulses,
-    kPulses
+    kPulses,
+    kNoAnswers,
+    kAnswers
   };
   struct Event {
     Change change{};
@@ -175,6 +182,9 @@ class StereoCameras final : public LiveSource {
   void look_for_silence(PairOutlet& outlet, MonotonicTime now) noexcept;
   void take_pulses(PairOutlet& outlet) noexcept;
   void look_for_pulses(PairOutlet& outlet, MonotonicTime now) noexcept;
+  void look_for_answers(PairOutlet& outlet) noexcept;
+  [[nodiscard]] bool answers(PairOutlet& outlet, Side side, CaptureTime mid_exposure, const SensorFrame& frame,
+                             std::uint64_t& sequence) noexcept;
   void trust_pulses(PairOutlet& outlet, bool trust) noexcept;
   [[nodiscard]] bool both_count() const noexcept;
   void look_for_fits(MonotonicTime now) noexcept;
@@ -199,9 +209,12 @@ class StereoCameras final : public LiveSource {
   // Capture thread's.
   std::optional<trigger::Pairer> pairer_;
   std::unique_ptr<trigger::Trigger> trigger_;
-  std::optional<trigger::PulseMatcher> matcher_;     ///< with a trigger
-  MonotonicTime last_pulse_{};                       ///< when one was told
-  bool pulses_trusted_ = false;                      ///< frames are numbered by them
+  std::optional<trigger::PulseMatcher> matcher_;  ///< with a trigger
+  MonotonicTime last_pulse_{};                    ///< when one was told
+  bool pulses_trusted_ = false;                   ///< frames are numbered by them
+  MonotonicTime last_answer_{};                   ///< when a frame answered one, or they began to be trusted
+  int answers_in_row_ = 0;
+  std::chrono::nanoseconds off_{0};                  ///< of the last frame that answered none
   std::array<Named, FramePool::kMaxSlots> named_{};  ///< by slot
   std::optional<MonotonicTime> armed_;               ///< when the first frame of all came
   MonotonicTime last_pair_{};
@@ -218,6 +231,7 @@ class StereoCameras final : public LiveSource {
   Counter mono_pairs_;
   Counter pulses_;
   std::atomic<bool> trigger_silent_{false};
+  std::atomic<bool> trigger_unanswered_{false};
 
   // Service thread's.
   std::vector<SourceNote> first_notes_;

@@ -34,7 +34,7 @@ StampKind stamp_kind(std::uint32_t flags, const Stream::Parts& parts, std::vecto
 
 Stream::Stream(Parts parts, std::vector<std::string>& notes)
     : parts_(std::move(parts)),
-      buffers_(parts_.node, parts_.layout, parts_.buffers, parts_.memory, parts_.info.name),
+      buffers_(parts_.node, parts_.layout, parts_.buffers, parts_.memory, parts_.heap, parts_.info.name),
       stamp_kind_(stamp_kind(buffers_.flags(), parts_, notes)),
       in_force_(parts_.controls.settings(), parts_.control_delay_frames) {
   parts_.info.buffers = buffers_.size();

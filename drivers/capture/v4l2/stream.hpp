@@ -26,14 +26,15 @@ struct StampKind {
   std::chrono::nanoseconds readout{0};
 };
 
-/// The buffers of one device: asked for, mapped, and given back with their owner.
+/// The buffers of one device: asked for, or taken from a heap, mapped, and given back with their owner.
 class Buffers {
  public:
   static constexpr std::size_t kMost = 32;
   static constexpr std::size_t kFewest = 3;
 
   /// Throws std::runtime_error, one line.
-  Buffers(const Device& device, const Layout& layout, std::size_t wanted, Memory memory, const std::string& name);
+  Buffers(const Device& device, const Layout& layout, std::size_t wanted, Memory memory, const std::string& heap,
+          const std::string& name);
   Buffers(const Buffers&) = delete;
   Buffers& operator=(const Buffers&) = delete;
   ~Buffers();
@@ -44,7 +45,14 @@ class Buffers {
   /// V4L2_BUF_FLAG_* that the driver gave the first one: they tell its clock.
   [[nodiscard]] std::uint32_t flags() const noexcept { return flags_; }
 
-  /// Around each lease, where they are exported: the processor's caches and the device's agree. No heap.
+  /// For QBUF and DQBUF: V4L2_MEMORY_MMAP or V4L2_MEMORY_DMABUF; with the latter, the descriptor of each plane.
+  [[nodiscard]] std::uint32_t memory_type() const noexcept;
+  [[nodiscard]] bool are_imported() const noexcept { return memory_ == Memory::kImported; }
+  [[nodiscard]] int descriptor(std::uint32_t buffer, std::size_t plane) const noexcept {
+    return buffers_[buffer].shared[plane];
+  }
+
+  /// Around each lease, where they are dma-bufs: the processor's caches and the device's agree. No heap.
   void begin_read(std::uint32_t buffer) const noexcept;
   void end_read(std::uint32_t buffer) const noexcept;
 
@@ -52,16 +60,18 @@ class Buffers {
   struct Buffer {
     std::uint8_t* memory = nullptr;
     std::size_t bytes = 0;
-    std::array<int, 2> exported{-1, -1};
+    std::array<int, 2> shared{-1, -1};  ///< its dma-bufs
   };
   void request(std::size_t wanted, const std::string& name);
   void map(std::uint32_t index, const std::string& name);
+  [[nodiscard]] int share(std::uint32_t index, std::size_t plane, std::size_t bytes, const std::string& name) const;
   void release() noexcept;
   void sync(std::uint32_t buffer, std::uint64_t flags) const noexcept;
 
   const Device& device_;
   Layout layout_;
   Memory memory_;
+  std::string heap_;
   std::array<Buffer, kMost> buffers_{};
   std::size_t count_ = 0;
   std::uint32_t flags_ = 0;
@@ -80,6 +90,7 @@ class Stream final : public Camera {
     int control_delay_frames = 1;
     std::size_t buffers = 0;
     Memory memory = Memory::kMapped;
+    std::string heap;
     std::optional<std::chrono::nanoseconds> readout;  ///< configured, or told by the driver
     std::chrono::nanoseconds readout_guess{0};        ///< else
   };

@@ -31,11 +31,16 @@ int Stream::queue(std::uint32_t index) noexcept {
   v4l2_buffer buffer{};
   std::array<v4l2_plane, 2> planes{};
   buffer.type = parts_.layout.buffer_type();
-  buffer.memory = V4L2_MEMORY_MMAP;
+  buffer.memory = buffers_.memory_type();
   buffer.index = index;
   if (parts_.layout.planes_interface) {
     buffer.m.planes = planes.data();
     buffer.length = static_cast<std::uint32_t>(parts_.layout.format->planes);
+  }
+  if (buffers_.are_imported()) {
+    if (!parts_.layout.planes_interface) buffer.m.fd = buffers_.descriptor(index, 0);
+    // 0 bytes: all that the dma-buf has.
+    for (std::size_t i = 0; i < planes.size(); ++i) planes[i].m.fd = buffers_.descriptor(index, i);
   }
   return parts_.node.ask(VIDIOC_QBUF, buffer);
 }
@@ -107,7 +112,7 @@ Camera::Take Stream::take(SensorFrame& frame) noexcept {
   v4l2_buffer buffer{};
   std::array<v4l2_plane, VIDEO_MAX_PLANES> planes{};
   buffer.type = parts_.layout.buffer_type();
-  buffer.memory = V4L2_MEMORY_MMAP;
+  buffer.memory = buffers_.memory_type();
   if (parts_.layout.planes_interface) {
     buffer.m.planes = planes.data();
     buffer.length = static_cast<std::uint32_t>(planes.size());

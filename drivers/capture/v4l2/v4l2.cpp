@@ -110,6 +110,7 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
   parts.info.counts_lost = true;
   parts.buffers = settings.buffers < 0 ? 0 : static_cast<std::size_t>(settings.buffers);
   parts.memory = settings.memory;
+  parts.heap = settings.heap;
   auto stream = std::make_unique<Stream>(std::move(parts), told);
   if (notes != nullptr) {
     for (const std::string& note : told) notes->push_back("camera " + name + ": " + note);

@@ -16,6 +16,7 @@ namespace stereotrack::capture::v4l2 {
 enum class Memory : std::uint8_t {
   kMapped,    ///< the device's memory, mapped; cached where driver and kernel can do that
   kExported,  ///< the same memory as dma-bufs, with DMA_BUF_IOCTL_SYNC around each lease
+  kImported,  ///< dma-bufs of Settings::heap, which the device writes to, with the same around each lease
 };
 
 /// What is wanted of one sensor. What is not said stays as the driver has it.
@@ -35,6 +36,8 @@ struct Settings {
                                       ///< the latter. Not said: see stamp_notes below
   int control_delay_frames = 2;       ///< from a change of a control to the first frame that was exposed with it
   Memory memory = Memory::kMapped;
+  std::string heap;  ///< of kImported: a dma-heap of the kernel's, /dev/dma_heap/system, or /dev/udmabuf: memory of the
+                     ///< process. A device that wants its memory in one piece takes linux,cma or reserved alone
 };
 
 /// Opens and sets up one sensor; start() makes it stream.

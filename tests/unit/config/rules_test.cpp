@@ -57,6 +57,48 @@ TEST(Rules, TheLineStartsWhereTheUserSpokeNotAtADefault) {
             "give low_sd <= high_sd; foreground.low_sd is from the defaults");
 }
 
+TEST(Rules, ATriggerHasWhatItsModeNeedsAndALineOfItsOwn) {
+  const Layer cameras =
+      text_layer("rig.toml", "[source]\nname = \"cameras\"\n[camera]\nleft.device = \"/dev/video0\"\n");
+  const auto with = [&](const std::string& text) { return refused({cameras, text_layer("trigger.toml", text)}); };
+  EXPECT_EQ(with(""), "");
+  EXPECT_EQ(with("trigger.mode = \"unseen\""), "");
+  for (const std::string mode : {"gpio", "external"}) {
+    const std::string text = "trigger.mode = \"" + mode + "\"\n";
+    EXPECT_EQ(
+        with(text),
+        "trigger.toml:1:16: trigger.mode: trigger.line is missing, gpio and external need it: give CHIP:LINE, for "
+        "example \"gpiochip0:17\"; trigger.line is from the defaults");
+    EXPECT_EQ(with(text + "trigger.line = \"sim:t\""), "");
+    EXPECT_NE(with(text + "trigger.line = \"t\"").find("is no GPIO line"), std::string::npos);
+    EXPECT_NE(with(text + "trigger.line = \"sim:t\"\n[[input]]\nname = \"door\"\nline = \"sim:t\"\n")
+                  .find("trigger.line: \"sim:t\" is that of input door, too"),
+              std::string::npos);
+    EXPECT_NE(with(text + "trigger.line = \"sim:t\"\n[[signal]]\nname = \"near\"\nline = \"sim:t\"\n")
+                  .find("trigger.line: \"sim:t\" is that of signal near, too"),
+              std::string::npos);
+  }
+  EXPECT_NE(with("trigger.mode = \"pwm\"").find("trigger.pwm_chip is missing"), std::string::npos);
+  EXPECT_EQ(with("trigger.mode = \"pwm\"\ntrigger.pwm_chip = \"0\""), "");
+  // Who watches no cameras may say what he likes of their trigger.
+  EXPECT_EQ(refused({override_layer("trigger.mode=gpio")}), "");
+}
+
+TEST(Rules, APulseIsOverBeforeTheNextOneIsDue) {
+  const auto with = [&](const std::string& mode, const std::string& more) {
+    return refused({text_layer("rig.toml",
+                               "[source]\nname = \"cameras\"\n[camera]\nleft.device = \"/dev/video0\"\n"
+                               "fps = 50.0\n[trigger]\nline = \"sim:t\"\npwm_chip = \"0\"\nmode = \"" +
+                                   mode + "\"\n" + more)});
+  };
+  EXPECT_EQ(with("gpio", "pulse_us = 18999.0"), "");
+  EXPECT_NE(with("gpio", "pulse_us = 19000.0").find("not over when the next one is due"), std::string::npos);
+  EXPECT_EQ(with("gpio", "pulse_us = 19000.0\nlate_us = 500.0"), "");
+  EXPECT_EQ(with("pwm", "pulse_us = 19999.0"), "");
+  EXPECT_NE(with("pwm", "pulse_us = 20000.0").find("longer than there is time between two"), std::string::npos);
+  EXPECT_EQ(with("external", "pulse_us = 20000.0"), "");  // somebody else's
+}
+
 TEST(Rules, CamerasNeedDevicesOfTheirOwn) {
   const Layer cameras = override_layer("source.name=cameras");
   EXPECT_NE(refused({cameras}).find("camera.left.device"), std::string::npos);

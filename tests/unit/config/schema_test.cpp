@@ -25,7 +25,9 @@ void change(const Key& key) {
     case Kind::kNumber:  // the bounds of an odd key are odd: NamesAreUniqueAndDefaultsAndBoundsAreAllowed says so
       key.set(Value{std::get<double>(key.get()) == key.max ? key.min : key.max});
       break;
-    case Kind::kText: key.set(Value{std::get<std::string>(key.get()) + "x"}); break;
+    case Kind::kText:  // of a GPIO line, CHIP:LINE is wanted
+      key.set(Value{std::get<std::string>(key.get()) + (key.name.ends_with("line") ? "chip:x" : "x")});
+      break;
     case Kind::kChoice:
       key.set(
           Value{std::get<std::string>(key.get()) == key.choices.front() ? key.choices.back() : key.choices.front()});

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "drivers/gpio/simulated_chip.hpp"
@@ -195,6 +198,84 @@ TEST(CamerasDaemon, SkewAndExposuresBeyondTheirLimitsAreAlarms) {
   EXPECT_EQ(stage, 2);
   EXPECT_GT(rig.daemon->vitals().skew_over.get(), 0U);
   EXPECT_GT(rig.daemon->vitals().exposures_differ.get(), 0U);
+}
+
+std::unique_ptr<trigger::PulseTrain> train_on(const std::string& line) {
+  const gpio::LineSpec spec{.name = {"sim", line}};
+  auto train = trigger::PulseTrain::create({.period = kPeriod, .width = milliseconds(1), .late = milliseconds(5)},
+                                           gpio::open_lines({&spec, 1}, "test"));
+  EXPECT_TRUE(train.has_value());
+  return std::move(*train);
+}
+
+TEST(CamerasDaemon, ItsOwnPulsesAskForFramesAndAMissedExposureIsTold) {
+  CameraScene scene(kSceneFormats[0], kPeriod);
+  auto train = train_on("daemon-trigger");
+  auto source = scene.open_triggered(20, train->trigger());
+  LiveRig rig(std::move(source), kLatency, {}, {}, {}, std::move(train));
+  int stage = 0;
+  run(rig, [&] {
+    switch (stage) {
+      case 0:
+        if (rig.ear.pairs().size() < 50) break;
+        scene.miss_one();
+        ++stage;
+        break;
+      case 1:
+        if (rig.daemon->figures().cameras[1].missed == 0) break;
+        ++stage;
+        break;
+      default:
+        return rig.ear.pairs().size() > 100 && !rig.ear.statuses().empty() &&
+               rig.ear.statuses().back().exposures_missed_right > 0;
+    }
+    return false;
+  });
+  scene.stop();
+  const trigger::PulseTrain::Counters& pulses = rig.daemon->train()->counters();
+  EXPECT_EQ(gpio::simulated_chip::edges("daemon-trigger"), 2 * pulses.given.get());
+  EXPECT_EQ(gpio::simulated_chip::level("daemon-trigger"), false);
+  EXPECT_EQ(rig.daemon->vitals().trigger_set.count(), pulses.given.get());
+  EXPECT_EQ(pulses.failed.get(), 0U);
+  EXPECT_GT(rig.outputs("on_time"), 0U);
+  EXPECT_GT(rig.ear.statuses().back().trigger_pulses, 50U);
+  const std::string metrics = metrics_text(*rig.daemon, 3);
+  for (const std::string& line :
+       {"stereotrack_trigger_train_total{fate=\"given\"} " + std::to_string(pulses.given.get()),
+        std::string("stereotrack_trigger_train_total{fate=\"skipped\"} "),
+        std::string("stereotrack_camera_exposures_total{camera=\"right\",fault=\"missed\"} "),
+        "stereotrack_trigger_set_seconds_count " + std::to_string(pulses.given.get())}) {
+    EXPECT_NE(metrics.find(line + (line.back() == ' ' ? "" : "\n")), std::string::npos) << line;
+  }
+  if (allocations_are_counted()) {
+    EXPECT_EQ(rig.daemon->vitals().allocations(), 0U);
+  }
+}
+
+TEST(CamerasDaemon, InAFaultItsPulsesStopAtOnce) {
+  CameraScene scene(kSceneFormats[0], kPeriod);
+  auto train = train_on("daemon-trigger-fault");
+  auto source = scene.open_triggered(20, train->trigger());
+  LiveRig rig(std::move(source), kLatency, {}, {}, {}, std::move(train));
+  bool safe = false;
+  std::uint64_t edges = 0;
+  std::uint64_t beats = 0;
+  run(rig, [&] {
+    if (rig.daemon->train()->counters().given.get() < 20) return false;
+    if (!safe) {
+      safe = rig.daemon->make_lines_safe();
+      EXPECT_TRUE(safe);
+      // A set() that was under way in the trigger thread is over a moment later: as the handler asks for it twice.
+      std::this_thread::sleep_for(milliseconds(20));
+      (void)rig.daemon->make_lines_safe();
+      edges = gpio::simulated_chip::edges("daemon-trigger-fault");
+      beats = rig.daemon->vitals().trigger_beats.get();
+    }
+    return rig.daemon->vitals().trigger_beats.get() > beats + 10;
+  });
+  scene.stop();
+  EXPECT_EQ(gpio::simulated_chip::edges("daemon-trigger-fault"), edges);
+  EXPECT_EQ(gpio::simulated_chip::level("daemon-trigger-fault"), false);
 }
 
 }  // namespace

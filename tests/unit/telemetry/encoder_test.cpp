@@ -246,7 +246,25 @@ TEST(Encoder, FullestStatusFitsIn1200Bytes) {
   const auto datagram = decode(bytes);
   ASSERT_TRUE(datagram && datagram->status);
   EXPECT_EQ(datagram->status->skew_max_us, 0xFFFF'FFFFU);
+  EXPECT_EQ(datagram->status->exposures_stray_right, std::numeric_limits<std::uint64_t>::max());
   EXPECT_EQ(datagram->status->clock_steps, std::numeric_limits<std::uint64_t>::max());
+}
+
+TEST(Encoder, WhatTheTriggerGaveAndTheCamerasAnsweredComesBackAsItWent) {
+  Status status = golden_status();
+  status.trigger_pulses = 200;
+  status.trigger_skipped = 201;
+  status.trigger_failed = 202;
+  status.exposures_missed_left = 203;
+  status.exposures_missed_right = 204;
+  status.exposures_doubled_left = 205;
+  status.exposures_doubled_right = 206;
+  status.exposures_stray_left = 207;
+  status.exposures_stray_right = 208;
+  Encoder encoder(kGoldenConfig);
+  const auto datagram = decode(encode_status(encoder, status));
+  ASSERT_TRUE(datagram && datagram->status);
+  EXPECT_EQ(*datagram->status, status);
 }
 
 TEST(Encoder, NoTargetIsOnePartWithoutTargets) {

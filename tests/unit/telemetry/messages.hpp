@@ -108,7 +108,7 @@ inline Message golden_live_message(const std::vector<TrackReport>& list) {
   return message;
 }
 
-/// Every field another value.
+/// Every field of the first schema another value: what is stored of it must stay readable.
 inline Status golden_status() {
   Status s;
   s.uptime_ms = 86'400'000;

@@ -183,7 +183,7 @@ TEST(Monitor, JsonOfALiveRigHasTheNamesOfTheSchema) {
                         "\"live\":{\"tai_offset_ns\":1700000037000000001,\"tai_error_ns\":1500,"
                         "\"send_error_ns\":35000,\"efforts_shed\":10,\"health\":136},\"status\":{\"sequence\":"));
   EXPECT_THAT(run.out, HasSubstr(",\"uptime_ms\":86400000,\"health\":2112,\"efforts_shed\":1,\"latency_us\":50000,"));
-  EXPECT_THAT(run.out, HasSubstr(",\"send_error_max_us\":120,\"skew_max_us\":40}}\n"));
+  EXPECT_THAT(run.out, HasSubstr(",\"send_error_max_us\":120,\"skew_max_us\":40,\"trigger_pulses\":0,"));
 }
 
 TEST(Monitor, LiveTableShowsHealthAndStatus) {

@@ -4,16 +4,19 @@
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
+#include <set>
 
 #include "drivers/capture/v4l2/formats.hpp"
 #include "pipeline/core/arena.hpp"
 #include "pipeline/photometry/ingest.hpp"
+#include "tests/system/board/capture/lent_memory.hpp"
 #include "tests/system/board/capture/vivid.hpp"
 
 namespace stereotrack::capture::v4l2::test {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 constexpr int kColourSquares = 4;
@@ -66,11 +69,13 @@ class Pictures : public VividTest {
     }
     return false;
   }
-  static Kept shot(std::string_view format, int pattern, Memory memory = Memory::kMapped) {
+  static Kept shot(std::string_view format, int pattern, Memory memory = Memory::kMapped,
+                   const std::string& heap = "") {
     Other(kLeft).set("Test Pattern", pattern);
     Settings wanted = settings();
     wanted.format = format;
     wanted.memory = memory;
+    wanted.heap = heap;
     wanted.width = 640;  // whose luma is a whole number of pages
     wanted.height = 480;
     const auto camera = started(wanted);
@@ -179,6 +184,57 @@ TEST_F(Pictures, ExportedBuffersShowWhatMappedOnesDo) {
   EXPECT_TRUE(shot("yuyv", kColourSquares, Memory::kExported).bytes == shot("yuyv", kColourSquares).bytes);
 }
 
+/// Heaps whose buffers the driver can write to as they are.
+std::vector<std::string> heaps() {
+  std::vector<std::string> there{kLender};
+  for (const char* const heap : {"/dev/dma_heap/system", "/dev/udmabuf"}) {
+    if (access(heap, R_OK | W_OK) == 0) there.emplace_back(heap);
+  }
+  return there;
+}
+
+TEST_F(Pictures, ImportedBuffersShowWhatMappedOnesDo) {
+  const Kept yuyv = shot("yuyv", kColourSquares);
+  const Kept grey = shot("grey8", kGreyRamp);
+  const int lent = lent_buffers;
+  for (const std::string& heap : heaps()) {
+    EXPECT_TRUE(shot("yuyv", kColourSquares, Memory::kImported, heap).bytes == yuyv.bytes) << heap;
+    EXPECT_TRUE(shot("grey8", kGreyRamp, Memory::kImported, heap).bytes == grey.bytes) << heap;
+  }
+  EXPECT_GE(lent_buffers - lent, 16);
+}
+
+// Each frame of a second lies where its lease says, in the heap's memory, until it is given back.
+TEST_F(Pictures, ImportedBuffersAreLeasedAndComeRoundManyTimes) {
+  for (const std::string& heap : heaps()) {
+    Settings wanted = settings();
+    wanted.memory = Memory::kImported;
+    wanted.heap = heap;
+    const auto camera = started(wanted);
+    std::set<const std::uint8_t*> places;
+    std::vector<SensorFrame> held;
+    for (int i = 0; i < 50; ++i) {
+      const SensorFrame frame = nth_frame(*camera);
+      EXPECT_FALSE(frame.damaged);
+      places.insert(camera->picture(frame.buffer).data);
+      held.push_back(frame);
+      if (held.size() < 3) continue;
+      camera->give_back(held.front().buffer);
+      held.erase(held.begin());
+    }
+    EXPECT_EQ(places.size(), camera->info().buffers) << heap;
+    EXPECT_EQ(camera->counters().lost, 0U) << heap;
+  }
+}
+
+TEST_F(Pictures, AHeapThatIsNotThereIsALineWithThoseThatAre) {
+  Settings wanted = settings();
+  wanted.memory = Memory::kImported;
+  wanted.heap = "/dev/dma_heap/none";
+  EXPECT_THAT(refusal([&] { (void)open(wanted); }), AllOf(HasSubstr("no memory from /dev/dma_heap/none"),
+                                                          AnyOf(HasSubstr("there are /dev/"), HasSubstr("has none"))));
+}
+
 TEST_F(Pictures, TheMultiPlanarInterfaceShowsTheSame) {
   const Kept grey = shot("grey8", kGreyRamp);
   const Kept nv12 = shot("nv12", kColourSquares);
@@ -188,6 +244,10 @@ TEST_F(Pictures, TheMultiPlanarInterfaceShowsTheSame) {
   EXPECT_TRUE(shot("nv12", kColourSquares).bytes == nv12.bytes);
   EXPECT_TRUE(shot("nv12m", kColourSquares).bytes == nv12.bytes);
   EXPECT_TRUE(shot("nv12m", kColourSquares, Memory::kExported).bytes == nv12.bytes);
+  for (const std::string& heap : heaps()) {
+    EXPECT_TRUE(shot("nv12m", kColourSquares, Memory::kImported, heap).bytes == nv12.bytes) << heap;
+    EXPECT_TRUE(shot("grey8", kGreyRamp, Memory::kImported, heap).bytes == grey.bytes) << heap;
+  }
   expect_same_luma({"grey10", "grey12", "grey16", "nv12", "nv12m", "yuyv", "uyvy"});
   Settings wanted = settings();
   wanted.format = "nv12m";  // 320 x 180 are 14 pages and a bit
