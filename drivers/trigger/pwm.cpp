@@ -23,9 +23,25 @@ namespace fs = std::filesystem;
 constexpr std::chrono::milliseconds kUdevPatience{1000};  // to hand a channel that was just exported to its group
 constexpr std::chrono::milliseconds kUdevRound{10};
 constexpr std::string_view kPrefix = "pwmchip";
+constexpr std::string_view kChannelPrefix = "pwm";
 
-bool is_number(std::string_view text) {
-  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+/// None: it is no number, or none of a chip or channel.
+std::optional<unsigned> number_of(std::string_view text) {
+  if (text.empty() || text.size() > 5 || text.find_first_not_of("0123456789") != std::string_view::npos) return {};
+  return static_cast<unsigned>(std::stoul(std::string(text)));
+}
+
+/// What follows the prefix, of each entry of a folder that has it and a number.
+std::vector<unsigned> numbers_in(const fs::path& folder, std::string_view prefix) {
+  std::vector<unsigned> numbers;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    if (const auto number = number_of(std::string_view(name).substr(prefix.size()))) numbers.push_back(*number);
+  }
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
 }
 
 /// The first line; none: it cannot be read.
@@ -84,21 +100,16 @@ bool write_zero(int fd) noexcept { return fd < 0 || pwrite(fd, "0\n", 2, 0) == 2
 
 std::vector<PwmChip> pwm_chips(const std::string& root) {
   std::vector<PwmChip> chips;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(root, error)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with(kPrefix) || !is_number(std::string_view(name).substr(kPrefix.size()))) continue;
-    PwmChip chip;
-    chip.name = name;
-    const fs::path device = fs::canonical(entry.path() / "device", error);
+  for (const unsigned number : numbers_in(root, kPrefix)) {
+    PwmChip& chip = chips.emplace_back();
+    chip.name = std::string(kPrefix) + std::to_string(number);
+    const fs::path folder = fs::path(root) / chip.name;
+    std::error_code error;
+    const fs::path device = fs::canonical(folder / "device", error);
     if (!error) chip.device = device.filename().string();
-    const std::string channels = read_line(entry.path() / "npwm").value_or("0");
-    if (is_number(channels) && channels.size() < 6) chip.channels = static_cast<unsigned>(std::stoul(channels));
-    chips.push_back(chip);
+    chip.channels = number_of(read_line(folder / "npwm").value_or("")).value_or(0);
+    chip.exported = numbers_in(folder, kChannelPrefix);
   }
-  std::sort(chips.begin(), chips.end(), [](const PwmChip& a, const PwmChip& b) {
-    return a.name.size() != b.name.size() ? a.name.size() < b.name.size() : a.name < b.name;
-  });
   return chips;
 }
 

@@ -67,6 +67,7 @@ struct PwmChip {
   std::string name;    ///< pwmchip0
   std::string device;  ///< fe20c000.pwm; empty: the kernel does not say
   unsigned channels = 0;
+  std::vector<unsigned> exported;  ///< channels that somebody uses, by number
 };
 /// Those that there are; none where the folder is not there.
 [[nodiscard]] std::vector<PwmChip> pwm_chips(const std::string& root = "/sys/class/pwm");

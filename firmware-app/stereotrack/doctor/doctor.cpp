@@ -13,9 +13,11 @@
 #include "drivers/gpio/line.hpp"
 #include "firmware-app/rig/cameras.hpp"
 #include "firmware-app/rig/rig.hpp"
+#include "firmware-app/rig/trigger.hpp"
 #include "firmware-app/stereotrack/doctor/judge.hpp"
 #include "firmware-app/stereotrack/doctor/measure.hpp"
 #include "firmware-app/stereotrack/doctor/probe.hpp"
+#include "firmware-app/stereotrack/doctor/pulses.hpp"
 #include "firmware-app/stereotrack/doctor/report.hpp"
 #include "firmware-app/stereotrack/doctor/suggest.hpp"
 
@@ -67,7 +69,7 @@ class Doctor {
     f_.cpu = probe_cpu(root);
     f_.memory = probe_memory(root);
     f_.limits = probe_limits(root);
-    f_.pwm = probe_pwm(root);
+    f_.pwm = trigger::pwm_chips((root / "sys/class/pwm").string());
     f_.clocks = probe_clocks(root);
     f_.missing = ask_rights(f_.configuration.realtime);
     f_.gpio_interface = gpio::gpiod::interface();
@@ -96,6 +98,8 @@ class Doctor {
                       : true;
     if (has_cameras()) {
       say("cameras");
+      const Pulses pulses(c);
+      if (!pulses.problem().empty()) f_.configuration_problems.push_back(pulses.problem());
       std::array<std::vector<std::string>, 2> notes;
       std::size_t side_opened = 0;
       const auto open = camera_opener(c.camera, [&](const std::string& note) { notes[side_opened].push_back(note); });
@@ -159,6 +163,11 @@ class Doctor {
     f_.has_calibration = rig_.calibration.has_value();
     const CameraCheck check = check_cameras(rig_.loaded);
     for (const std::string& failure : check.failures) f_.configuration_problems.push_back(failure);
+    try {
+      f_.trigger = check_trigger(c);
+    } catch (const std::runtime_error& error) {
+      f_.configuration_problems.emplace_back(error.what());
+    }
   }
 
   /// Without a configuration: the cameras that there are, in the calibration's size where there is one.

@@ -10,6 +10,7 @@
 #include "config/configuration.hpp"
 #include "drivers/capture/v4l2/v4l2.hpp"
 #include "drivers/gpio/gpiod.hpp"
+#include "drivers/trigger/pwm.hpp"
 #include "firmware-app/runtime/real_time.hpp"
 
 /// `stereotrack doctor`: what a board has, what it can keep, and what to do about what it lacks.
@@ -68,13 +69,6 @@ struct LimitFacts {
   std::string user;
   std::optional<std::int64_t> locked_kb;  ///< memory; none: as much as it likes
   int priority = 0;                       ///< highest real-time priority; 0: none
-};
-
-struct PwmChip {
-  std::string name;    ///< pwmchip0
-  std::string device;  ///< 1f00098000.pwm
-  int channels = 0;
-  std::vector<int> exported;  ///< channels that somebody uses
 };
 
 struct ClockFacts {
@@ -176,6 +170,7 @@ struct Findings {
   bool cameras_wanted = true;                       ///< false: the configuration plays a scene or a recording
   config::Configuration configuration;              ///< the file's, or the suggested one
   std::vector<std::string> configuration_problems;  ///< calibration, sizes, keys: one line each
+  std::string trigger;                              ///< what the configuration's will do; empty: nobody asked
 
   KernelFacts kernel;
   CpuFacts cpu;
@@ -184,7 +179,7 @@ struct Findings {
   std::vector<runtime::Missing> missing;  ///< of what the daemon would ask for
   std::string gpio_interface;             ///< of libgpiod: "1", "2", "none"
   std::vector<gpio::gpiod::ChipListing> chips;
-  std::vector<PwmChip> pwm;
+  std::vector<trigger::PwmChip> pwm;
   ClockFacts clocks;
   CamerasFound found;
   std::vector<LineFound> lines;

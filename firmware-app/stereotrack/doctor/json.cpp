@@ -137,7 +137,7 @@ Json facts_of(const Findings& f) {
                                      {"problem", line.problem}});
   }
   Json& pwm = json["pwm"] = Json::array();
-  for (const PwmChip& chip : f.pwm) {
+  for (const trigger::PwmChip& chip : f.pwm) {
     pwm.push_back(
         {{"name", chip.name}, {"device", chip.device}, {"channels", chip.channels}, {"exported", chip.exported}});
   }

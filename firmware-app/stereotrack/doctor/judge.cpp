@@ -193,7 +193,7 @@ class Judge {
       const std::string what = line.key + ": " + line.line;
       if (!line.problem.empty()) {
         problem("gpio", line.key + ": " + line.problem, {}, {});
-      } else if (line.consumer == "stereotrackd") {
+      } else if (line.consumer.starts_with("stereotrackd")) {
         ok("gpio", what + " is held by the stereotrackd that runs");
       } else if (!line.consumer.empty()) {
         problem("gpio", what + " is busy: held by \"" + line.consumer + "\"", "stop that, or take another line",
@@ -207,8 +207,9 @@ class Judge {
   void pwm() {
     std::vector<std::string> chips;
     chips.reserve(f_.pwm.size());
-    for (const PwmChip& chip : f_.pwm) {
-      chips.push_back(chip.name + " (" + joined({chip.device, count_text(chip.channels, "channel")}, ", ") +
+    for (const trigger::PwmChip& chip : f_.pwm) {
+      chips.push_back(chip.name + " (" +
+                      joined({chip.device, count_text(static_cast<int>(chip.channels), "channel")}, ", ") +
                       (chip.exported.empty() ? "" : ", " + std::to_string(chip.exported.size()) + " in use") + ")");
     }
     ok("pwm", chips.empty() ? "none: pulses come from lines or from outside" : joined(chips, ", "));
@@ -284,6 +285,7 @@ class Judge {
   }
 
   void configuration() {
+    if (!f_.trigger.empty()) ok("config", f_.trigger);
     for (const std::string& what : f_.configuration_problems) {
       problem("config", what, {}, {});
     }

@@ -14,8 +14,6 @@ namespace stereotrack::doctor {
 [[nodiscard]] KernelFacts probe_kernel(const std::filesystem::path& root);
 [[nodiscard]] CpuFacts probe_cpu(const std::filesystem::path& root);
 [[nodiscard]] MemoryFacts probe_memory(const std::filesystem::path& root);
-/// By number.
-[[nodiscard]] std::vector<PwmChip> probe_pwm(const std::filesystem::path& root);
 /// The source by `root`; TAI is asked of the kernel that runs.
 [[nodiscard]] ClockFacts probe_clocks(const std::filesystem::path& root);
 [[nodiscard]] LimitFacts probe_limits(const std::filesystem::path& root);

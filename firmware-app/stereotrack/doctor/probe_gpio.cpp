@@ -1,6 +1,7 @@
 #include <stdexcept>
 
 #include "drivers/gpio/locate.hpp"
+#include "firmware-app/rig/cameras.hpp"
 #include "firmware-app/stereotrack/doctor/probe.hpp"
 
 namespace stereotrack::doctor {
@@ -29,12 +30,17 @@ LineFound look_up(std::string key, const std::string& line, bool output,
 std::vector<LineFound> probe_lines(const config::Configuration& configuration) {
   std::vector<LineFound> lines;
   const std::vector<gpio::gpiod::ChipListing> chips = gpio::gpiod::list_chips();
-  lines.reserve(configuration.signals.size() + configuration.inputs.size());
+  lines.reserve(configuration.signals.size() + configuration.inputs.size() + 1);
   for (const config::SignalConfig& signal : configuration.signals) {
     lines.push_back(look_up("signal " + signal.name, signal.line, true, chips));
   }
   for (const config::InputConfig& input : configuration.inputs) {
     lines.push_back(look_up("input " + input.name, input.line, false, chips));
+  }
+  const config::TriggerConfig& trigger = configuration.trigger;
+  const bool is_driven = trigger.mode == config::TriggerMode::kGpio;
+  if (configuration.source.name == kCameras && (is_driven || trigger.mode == config::TriggerMode::kExternal)) {
+    lines.push_back(look_up("trigger", trigger.line, is_driven, chips));
   }
   return lines;
 }

@@ -98,20 +98,6 @@ TEST(ProbeLimits, ReadsThemAndUnlimitedIsNoNumber) {
   EXPECT_EQ(probe_limits(board.root()).priority, 0);
 }
 
-TEST(ProbePwm, ReadsChipsTheirDevicesAndWhatIsInUse) {
-  const BoardTree board;
-  board.write("sys/class/pwm/pwmchip10/npwm", "1\n");
-  board.write("sys/class/pwm/pwmchip2/npwm", "2\n");
-  const std::vector<PwmChip> chips = probe_pwm(board.root());
-  ASSERT_EQ(chips.size(), 3U);
-  EXPECT_EQ(chips[0].name, "pwmchip0");
-  EXPECT_EQ(chips[0].device, "1f00098000.pwm");
-  EXPECT_EQ(chips[0].channels, 4);
-  EXPECT_THAT(chips[0].exported, ElementsAre(1));
-  EXPECT_EQ(chips[1].name, "pwmchip2");
-  EXPECT_EQ(chips[2].name, "pwmchip10");
-}
-
 TEST(ProbeClocks, ReadsTheSourceAndTheCardsThatHaveOne) {
   const BoardTree board;
   const ClockFacts facts = probe_clocks(board.root());
@@ -129,7 +115,6 @@ TEST(Probes, AnEmptyTreeTellsNothing) {
   EXPECT_EQ(probe_cpu(empty.path()).hottest_c, std::nullopt);
   EXPECT_EQ(probe_memory(empty.path()).total_mb, 0);
   EXPECT_THAT(probe_memory(empty.path()).dma_heaps, IsEmpty());
-  EXPECT_THAT(probe_pwm(empty.path()), IsEmpty());
   EXPECT_EQ(probe_clocks(empty.path()).source, "");
 }
 

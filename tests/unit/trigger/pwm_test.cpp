@@ -151,6 +151,9 @@ TEST(Pwm, AChipIsNamedByItselfItsNumberItsPathOrItsDevice) {
   }
   ASSERT_EQ(pwm_chips(sysfs.root().string()).size(), 2U);
   EXPECT_EQ(pwm_chips(sysfs.root().string())[0].device, "fe20c000.pwm");
+  EXPECT_TRUE(pwm_chips(sysfs.root().string())[0].exported.empty());
+  sysfs.make_channel(1);
+  EXPECT_EQ(pwm_chips(sysfs.root().string())[0].exported, std::vector<unsigned>{1});
   EXPECT_TRUE(pwm_chips((sysfs.root() / "none").string()).empty());
 }
 
