@@ -12,7 +12,7 @@
 #include "drivers/capture/libcamera/clock_finder.hpp"
 #include "drivers/capture/libcamera/loader.hpp"
 #include "drivers/capture/libcamera/module.h"
-#include "drivers/capture/v4l2/stamps.hpp"
+#include "drivers/capture/sequence_count.hpp"
 #include "pipeline/core/counter.hpp"
 
 namespace stereotrack::capture::libcamera {
@@ -66,7 +66,7 @@ class Stream final : public Camera {
 
   // Capture thread's; failure() reads them after it was handed over.
   ClockFinder finder_;
-  v4l2::SequenceCount sequence_;
+  SequenceCount sequence_;
   const char* loss_ = nullptr;
 
   std::atomic<std::int64_t> offset_ns_{0};

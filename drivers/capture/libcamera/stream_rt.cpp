@@ -46,7 +46,7 @@ Camera::Take Stream::take(SensorFrame& frame) noexcept {
   if (finder_.frame(start, nanoseconds(told.completed_time), exposure)) steps_.add();
   offset_ns_.store(finder_.offset().count(), std::memory_order_relaxed);
 
-  const v4l2::SequenceCount::Frame counted = sequence_.next(told.sequence);
+  const SequenceCount::Frame counted = sequence_.next(told.sequence);
   frame.mid_exposure = CaptureTime(start + exposure / 2);
   frame.arrived = MonotonicTime(nanoseconds(told.completed_time));
   frame.sequence = counted.sequence;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drivers/capture/camera.hpp"
+#include "drivers/capture/sequence_count.hpp"
 #include "drivers/capture/v4l2/controls.hpp"
 #include "drivers/capture/v4l2/device.hpp"
 #include "drivers/capture/v4l2/layout.hpp"

@@ -71,7 +71,7 @@ class Doctor {
     f_.limits = probe_limits(root);
     f_.pwm = trigger::pwm_chips((root / "sys/class/pwm").string());
     f_.clocks = probe_clocks(root);
-    f_.missing = ask_rights(f_.configuration.realtime);
+    f_.missing = ask_rights(f_.configuration);
     f_.gpio_interface = gpio::gpiod::interface();
     f_.chips = gpio::gpiod::list_chips();
     f_.lines = probe_lines(f_.configuration);

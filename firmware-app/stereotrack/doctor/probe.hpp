@@ -22,7 +22,7 @@ namespace stereotrack::doctor {
 
 /// What the daemon would ask for with this configuration and not be granted: memory, deep sleep, each thread's priority
 /// and core. Asks as the daemon does and lets go again; nothing with realtime.mode = "off".
-[[nodiscard]] std::vector<runtime::Missing> ask_rights(const config::RealTimeConfig& realtime);
+[[nodiscard]] std::vector<runtime::Missing> ask_rights(const config::Configuration& configuration);
 
 /// All cameras, of all drivers. Waits for libcamera, where there is a module for it.
 [[nodiscard]] CamerasFound probe_cameras();

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "drivers/gpio/line.hpp"
 #include "firmware-app/stereotrack/doctor/tree.hpp"
 #include "tests/unit/doctor/board_tree.hpp"
@@ -127,20 +129,27 @@ TEST(Probes, ThisMachineIsTold) {
 }
 
 TEST(AskRights, NothingIsAskedWhereItIsOff) {
-  config::RealTimeConfig realtime;
-  realtime.mode = config::RealTimeMode::kOff;
-  realtime.publisher.core = 1023;
-  EXPECT_THAT(ask_rights(realtime), IsEmpty());
+  config::Configuration configuration;
+  configuration.realtime.mode = config::RealTimeMode::kOff;
+  configuration.realtime.publisher.core = 1023;
+  EXPECT_THAT(ask_rights(configuration), IsEmpty());
 }
 
 TEST(AskRights, WhatNoMachineGrantsIsNamedByItsThread) {
-  config::RealTimeConfig realtime;
-  realtime.frames.core = 1023;
-  bool told = false;
-  for (const runtime::Missing& missing : ask_rights(realtime)) {
-    told = told || missing.what.find("thread st-frames: core 1023") != std::string::npos;
-  }
-  EXPECT_TRUE(told);
+  config::Configuration configuration;
+  configuration.realtime.frames.core = 1023;
+  configuration.realtime.trigger.core = 1022;
+  const auto told = [&](const char* what) {
+    const std::vector<runtime::Missing> missing = ask_rights(configuration);
+    return std::any_of(missing.begin(), missing.end(),
+                       [&](const runtime::Missing& one) { return one.what.find(what) != std::string::npos; });
+  };
+  EXPECT_TRUE(told("thread st-frames: core 1023"));
+  EXPECT_FALSE(told("thread st-trigger"));
+  configuration.source.name = "cameras";
+  configuration.trigger.mode = config::TriggerMode::kGpio;
+  configuration.trigger.line = "sim:doctor_trigger";
+  EXPECT_TRUE(told("thread st-trigger: core 1022"));
 }
 
 TEST(ProbeLines, LinesAreLookedUpAndNotRequested) {
