@@ -11,7 +11,7 @@
 # A processor of the emulator is slow, and of its two one runs at a time: who is woken may wait for a tick of the kernel
 # (4 ms), so what leaves within 20 ms is not late here. That nothing was lost, shed or late is a fact before all others.
 # wants: bin/stereotrackd bin/stereotrack tests/play_loopback tests/keep_telemetry tests/stamp_pictures
-# limit: 600
+# limit: 2000
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
 # shellcheck source=tests/system/board/guest/daemon.sh
