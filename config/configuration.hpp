@@ -60,6 +60,7 @@ struct CameraConfig {
   double readout_us = 0;              ///< [us]; 0: as the driver tells
   double timeout_ms = 500;            ///< [ms]
   double tolerance = 0.25;            ///< of the period
+  bool steer = true;                  ///< the right one's rate follows the left one's; TriggerMode::kFreeRun alone
   double skew_limit_ms = 5;           ///< alarm [ms]; 0: none
   double exposure_limit_percent = 5;  ///< alarm; 0: none
 };

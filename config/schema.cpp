@@ -100,6 +100,9 @@ std::vector<Key> keys_of(Configuration& c) {
       key("camera.tolerance", c.camera.tolerance, 0.001, 0.5, "period",
           "Left and right pictures exposed this near to each other are a pair; 0.5 for cameras that nobody "
           "synchronises."),
+      key("camera.steer", c.camera.steer,
+          "With trigger.mode = \"free-run\", and where the right camera's driver allows: its rate is held to the left "
+          "one's, so that both expose together. False: phase and drift are only told."),
       key("camera.skew_limit_ms", c.camera.skew_limit_ms, 0, 1000, "ms",
           "A pair whose exposures are further apart raises an alarm in health; 0: none does."),
       key("camera.exposure_limit_percent", c.camera.exposure_limit_percent, 0, 100, "%",

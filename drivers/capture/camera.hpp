@@ -39,13 +39,20 @@ struct SensorFrame {
   SensorSettings settings;  ///< in force when it was exposed
 };
 
+/// The times between frames that a sensor can be set to while it streams.
+struct PeriodRange {
+  std::chrono::nanoseconds least{0};
+  std::chrono::nanoseconds most{0};
+  std::chrono::nanoseconds quantum{0};  ///< they lie so far apart; > 0
+};
+
 /// One sensor's stream, whoever delivers it. Its buffers are the driver's: a frame that was taken stays where the
 /// driver put it until give_back() names its buffer, in any order.
 ///
 /// A factory opens it, sets format and controls and throws std::runtime_error with one line naming the device and the
-/// way out. start(), failure() and the destructor belong to the thread that may wait and allocate; what stands below
-/// "Capture thread" to that thread alone, from start() to its end. A camera that is gone never comes back: another is
-/// opened.
+/// way out. start(), failure() and the destructor belong to the thread that may wait and allocate, and so does what
+/// stands below "Service thread"; what stands below "Capture thread" to that thread alone, from start() to its end. A
+/// camera that is gone never comes back: another is opened.
 class Camera {
  public:
   enum class Take : std::uint8_t {
@@ -75,6 +82,18 @@ class Camera {
   /// After take() has said kLost, and handed over from the thread that heard it: one line naming the device, the cause
   /// and the way out. Else empty.
   [[nodiscard]] virtual std::string failure() const = 0;
+
+  // ---- Service thread, while the capture thread takes frames; may wait for the device
+
+  /// What set_period() can do. Empty: nothing, or not as it is set up now.
+  [[nodiscard]] virtual std::optional<PeriodRange> period_range() const noexcept { return std::nullopt; }
+
+  /// The time between frames, from some frame of the next few on. What the driver says that it made of it; empty: it
+  /// refuses, and all is as before. Exposure stays as it is where it has room in the period.
+  virtual std::optional<std::chrono::nanoseconds> set_period(std::chrono::nanoseconds wanted) noexcept {
+    (void)wanted;
+    return std::nullopt;
+  }
 
   // ---- Capture thread; no lock, no heap
 

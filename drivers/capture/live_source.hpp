@@ -51,6 +51,16 @@ struct CameraFigures {
   std::uint64_t back_off_ms = 0;  ///< now: between two attempts; 0: none is wanted
 };
 
+/// Whether the right camera's rate follows the left one's.
+enum class Steering : std::uint8_t {
+  kOff,          ///< nobody wants it, or one of the two is not there
+  kCannot,       ///< its driver cannot
+  kMeasuring,    ///< the drift is not known yet
+  kApproaching,  ///< it does, and they are not together yet
+  kLocked,
+  kGivenUp,  ///< its driver takes what is asked and does not do it, or refuses
+};
+
 /// What a source of cameras counts; a film counts nothing.
 struct SourceFigures {
   bool of_cameras = false;
@@ -73,6 +83,8 @@ struct SourceFigures {
   std::uint64_t notes_lost = 0;                   ///< changes of state that the log lacks
   std::optional<std::chrono::nanoseconds> phase;  ///< by how much the right exposes later, within half a period
   std::optional<double> drift;                    ///< of the phase [s/s]
+  Steering steering = Steering::kOff;             ///< now
+  std::optional<std::chrono::nanoseconds> steered_period;  ///< that the right camera is set to now
 };
 
 /// Where a live source puts its pairs. The capture thread's side of the pool and of the notices.

@@ -87,6 +87,7 @@ capture::StereoCameras::Config pairing_config(const config::Configuration& confi
   pairing.tolerance = camera.tolerance;
   pairing.timeout = config::from_ms(camera.timeout_ms);
   pairing.exposure = config::from_ms(camera.exposure_us * 1e-3);
+  pairing.steer = camera.steer;
   if (trigger.mode == config::TriggerMode::kFreeRun) return pairing;
   // The sensors could do another rate; they get this one.
   pairing.triggered = true;

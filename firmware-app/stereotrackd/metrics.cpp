@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdarg>
 #include <cstdio>
+#include <utility>
 
 #include "firmware-app/stereotrackd/daemon.hpp"
 
@@ -138,6 +139,20 @@ void add_cameras(Text& text, const capture::SourceFigures& figures) {
     text.family("camera_drift_ratio", "gauge",
                 "Drift of the phase in seconds a second: 0 where they are synchronised.");
     text.number("", *figures.drift);
+  }
+  if (figures.steering != capture::Steering::kOff) {
+    text.family("camera_steering", "gauge", "1: whether the right camera's rate follows the left one's.");
+    using S = capture::Steering;
+    constexpr std::pair<S, const char*> kStates[] = {{S::kCannot, "{state=\"cannot\"}"},
+                                                     {S::kMeasuring, "{state=\"measuring\"}"},
+                                                     {S::kApproaching, "{state=\"approaching\"}"},
+                                                     {S::kLocked, "{state=\"locked\"}"},
+                                                     {S::kGivenUp, "{state=\"given_up\"}"}};
+    for (const auto& [state, label] : kStates) text.value(label, figures.steering == state ? 1 : 0);
+  }
+  if (figures.steered_period) {
+    text.family("camera_steered_period_seconds", "gauge", "Time between frames that the right camera is set to.");
+    text.number("", std::chrono::duration<double>(*figures.steered_period).count());
   }
 }
 

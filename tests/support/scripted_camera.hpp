@@ -13,6 +13,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -88,6 +89,23 @@ class SensorScript {
     start_refusal_ = std::move(why);
   }
 
+  /// Its period can be set while it streams, to multiples of the quantum.
+  void allow_periods(const capture::PeriodRange& range) {
+    const std::lock_guard lock(mutex_);
+    periods_ = range;
+  }
+  /// The driver answers as ever and the sensor stays as it was.
+  void ignore_periods(bool ignore) {
+    const std::lock_guard lock(mutex_);
+    ignores_periods_ = ignore;
+  }
+  /// That the sensor keeps now; as opened, that of its info.
+  [[nodiscard]] std::chrono::nanoseconds period() const {
+    const std::lock_guard lock(mutex_);
+    return period_;
+  }
+  [[nodiscard]] int periods_set() const { return periods_set_.load(); }
+
   [[nodiscard]] bool is_open() const {
     const std::lock_guard lock(mutex_);
     return descriptor_ >= 0;
@@ -129,6 +147,10 @@ class SensorScript {
   std::string start_refusal_;
   int descriptor_ = -1;
   bool is_lost_ = false;
+  std::optional<capture::PeriodRange> periods_;
+  bool ignores_periods_ = false;
+  std::chrono::nanoseconds period_{0};
+  std::atomic<int> periods_set_{0};
   std::uint64_t late_ = 0;
   std::vector<State> states_;
   std::vector<std::vector<std::uint8_t>> pixels_;
@@ -158,6 +180,7 @@ class ScriptedCamera final : public capture::Camera {
                            std::vector<std::uint8_t>(picture_bytes(info_.format, info_.width, info_.height)));
     script_.queued_ = 0;
     script_.is_lost_ = false;
+    script_.period_ = info_.period;
     script_.late_ = 0;
     script_.descriptor_ = eventfd(0, EFD_SEMAPHORE | EFD_NONBLOCK | EFD_CLOEXEC);
     script_.opened_.fetch_add(1);
@@ -219,6 +242,20 @@ class ScriptedCamera final : public capture::Camera {
             static_cast<std::ptrdiff_t>(row_bytes(info_.format, info_.width)), info_.format};
   }
   [[nodiscard]] std::string failure() const override { return failure_; }
+  [[nodiscard]] std::optional<capture::PeriodRange> period_range() const noexcept override {
+    const std::lock_guard lock(script_.mutex_);
+    return script_.periods_;
+  }
+  std::optional<std::chrono::nanoseconds> set_period(std::chrono::nanoseconds wanted) noexcept override {
+    const std::lock_guard lock(script_.mutex_);
+    if (!script_.periods_) return std::nullopt;
+    const capture::PeriodRange& range = *script_.periods_;
+    const std::chrono::nanoseconds within = std::clamp(wanted, range.least, range.most);
+    const std::chrono::nanoseconds made = within / range.quantum * range.quantum;
+    if (!script_.ignores_periods_) script_.period_ = made;
+    script_.periods_set_.fetch_add(1);
+    return made;
+  }
   [[nodiscard]] ClockMap clock_map() const noexcept override {
     return {CaptureTime(), MonotonicTime(std::chrono::nanoseconds(script_.offset_ns_.load()))};
   }

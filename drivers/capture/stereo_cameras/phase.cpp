@@ -22,6 +22,12 @@ double PhaseEstimator::folded(double distance_s) const noexcept {
   return distance_s - period * std::floor(distance_s / period + 0.5);
 }
 
+std::optional<PhaseEstimator::Latest> PhaseEstimator::latest() const noexcept {
+  if (seconds_count_ == 0) return std::nullopt;
+  const Second& last = seconds_[seconds_count_ - 1];
+  return Latest{last.time, std::chrono::nanoseconds(std::llround(folded(last.distance_s) * 1e9))};
+}
+
 void PhaseEstimator::restart() noexcept {
   count_ = 0;
   seconds_count_ = 0;

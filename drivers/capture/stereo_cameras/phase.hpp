@@ -38,6 +38,12 @@ class PhaseEstimator {
   void restart() noexcept;
 
   [[nodiscard]] std::optional<std::chrono::nanoseconds> phase() const noexcept { return phase_; }
+  /// Of the last whole second alone: what follows changes of a rate at once.
+  struct Latest {
+    CaptureTime time{};  ///< its middle
+    std::chrono::nanoseconds phase{0};
+  };
+  [[nodiscard]] std::optional<Latest> latest() const noexcept;
   [[nodiscard]] std::optional<double> drift() const noexcept { return drift_; }  ///< [s/s]
 
  private:

@@ -112,6 +112,7 @@ StereoCameras::StereoCameras(Open open, const Config& config, std::unique_ptr<tr
     each.buffers = each.camera->info().buffers;
     try {
       each.camera->start();
+      each.serves = each.camera.get();
       each.joined = now();
     } catch (const std::runtime_error& error) {
       failures[static_cast<std::size_t>(side)] = error.what();
@@ -598,6 +599,8 @@ void StereoCameras::bury(Side side, std::vector<SourceNote>& notes) {
   Eye& each = eye(side);
   const std::unique_ptr<Camera> dead(each.retired.exchange(nullptr, std::memory_order_acquire));
   if (!dead) return;
+  each.serves = nullptr;
+  phase_.restart();
   each.is_wanted = true;
   each.next_try = now() + each.back_off;
   each.back_off_ms.set(static_cast<std::uint64_t>(each.back_off.count() / 1'000'000));
@@ -627,6 +630,7 @@ void StereoCameras::reopen(Side side, std::vector<SourceNote>& notes) {
       each.reopened.add();
       each.is_wanted = false;
       each.last_refusal.clear();
+      each.serves = camera.get();
       each.incoming.store(camera.release(), std::memory_order_release);
     }
   } catch (const std::exception& error) {
@@ -659,16 +663,104 @@ void StereoCameras::estimate_phase() noexcept {
   drift_ppb_.store(drift ? std::llround(*drift * 1e9) : kUnknown, std::memory_order_relaxed);
 }
 
+void StereoCameras::say_steering(std::vector<SourceNote>& notes) {
+  using State = RateSteering::State;
+  using Weight = SourceNote::Weight;
+  const State state = steering_.state();
+  if (state == told_steering_) return;
+  const State before = std::exchange(told_steering_, state);
+  const auto text = [](const char* format, double value) {
+    char line[160];
+    (void)std::snprintf(line, sizeof line, format, value);
+    return std::string(line);
+  };
+  const double phase_ms = to_seconds(std::chrono::nanoseconds(phase_ns_.load(std::memory_order_relaxed))) * 1e3;
+  switch (state) {
+    case State::kOff:
+    case State::kMeasuring: break;
+    case State::kCannot: {
+      std::string why = "its driver cannot set its rate while it streams";
+      if (steering_.obstacle() == RateSteering::Obstacle::kNoRoom)
+        why = "its rate is at the end of what its driver can set: change camera.fps by a hundredth";
+      if (steering_.obstacle() == RateSteering::Obstacle::kCoarse)
+        why = "its driver sets its rate in steps that are too large";
+      notes.push_back({Weight::kNotice, "camera_not_steered", "right",
+                       "right camera: its rate does not follow the left one's: " + why});
+      break;
+    }
+    case State::kApproaching:
+      if (before == State::kLocked) {
+        notes.push_back({Weight::kWarning, "camera_off_rate", "right",
+                         "right camera: is no longer together with the left one, its rate is steered anew"});
+      } else {
+        notes.push_back({Weight::kNotice, "camera_steered", "right",
+                         text("right camera: its rate is made to follow the left one's, drift %.1f ppm",
+                              steering_.natural() * 1e6) +
+                             text(", phase %.2f ms", phase_ms)});
+      }
+      break;
+    case State::kLocked:
+      notes.push_back({Weight::kNotice, "camera_on_rate", "right",
+                       text("right camera: its rate follows the left one's: phase %.2f ms", phase_ms)});
+      break;
+    case State::kGivenUp:
+      notes.push_back({Weight::kWarning, "camera_not_steered", "right",
+                       "right camera: does not do what its driver is asked for its rate, which stays as it was: "
+                       "camera.steer = false, or a trigger"});
+      break;
+  }
+}
+
+/// The right camera's rate to the left one's.
+void StereoCameras::steer(std::vector<SourceNote>& notes) {
+  using State = RateSteering::State;
+  if (!config_.steer || config_.triggered || !has_two()) return;
+  Camera* const right = eye(Side::kRight).serves;
+  const bool both = right != nullptr && eye(Side::kLeft).serves != nullptr;
+  if (!both && steering_.state() != State::kOff) {
+    // Nothing to follow: as it was opened.
+    if (right != nullptr && steering_.period() != steering_.nominal()) (void)right->set_period(steering_.nominal());
+    steering_.stop();
+  }
+  if (both && steering_.state() == State::kOff) {
+    phase_.restart();
+    steering_.begin(right->info().period, right->period_range());
+  }
+  const auto latest = phase_.latest();
+  if (both && latest && latest->time != steered_by_) {
+    steered_by_ = latest->time;
+    steering_.measured(latest->time, latest->phase, phase_.drift());
+    if (steering_.state() == State::kLocked && told_steering_ != State::kLocked) {
+      phase_.restart();  // what it was on the way says nothing of what it is
+      phase_ns_.store(latest->phase.count(), std::memory_order_relaxed);
+    }
+  }
+  const bool hears = both && !eye(Side::kRight).silent.load(std::memory_order_relaxed);
+  if (const auto wanted = hears ? steering_.next(now()) : std::nullopt) {
+    if (const auto period = right->set_period(*wanted)) {
+      steering_.made(now(), *period);
+    } else {
+      steering_.refused();
+    }
+  }
+  say_steering(notes);
+  static_assert(static_cast<int>(Steering::kGivenUp) == static_cast<int>(State::kGivenUp));
+  steering_state_.store(static_cast<Steering>(steering_.state()), std::memory_order_relaxed);
+  steered_period_ns_.store(steering_.state() >= State::kApproaching ? steering_.period().count() : kUnknown,
+                           std::memory_order_relaxed);
+}
+
 void StereoCameras::tend(std::vector<SourceNote>& notes) {
   notes.insert(notes.end(), first_notes_.begin(), first_notes_.end());
   first_notes_.clear();
   Event event;
   while (events_.pop(event)) say(event, notes);
+  estimate_phase();
   for (const Side side : kSides) {
     bury(side, notes);
     reopen(side, notes);
   }
-  estimate_phase();
+  steer(notes);
   if (!trigger_) return;
   std::vector<trigger::Trigger::Note> of_trigger;
   trigger_->tend(now(), of_trigger);
@@ -715,6 +807,9 @@ SourceFigures StereoCameras::figures() const noexcept {
   const std::int64_t phase = phase_ns_.load(std::memory_order_relaxed);
   const std::int64_t drift = drift_ppb_.load(std::memory_order_relaxed);
   if (phase != kUnknown) out.phase = std::chrono::nanoseconds(phase);
+  const std::int64_t period = steered_period_ns_.load(std::memory_order_relaxed);
+  out.steering = steering_state_.load(std::memory_order_relaxed);
+  if (period != kUnknown) out.steered_period = std::chrono::nanoseconds(period);
   if (drift != kUnknown) out.drift = static_cast<double>(drift) * 1e-9;
   return out;
 }

@@ -14,6 +14,7 @@
 #include "drivers/capture/camera.hpp"
 #include "drivers/capture/live_source.hpp"
 #include "drivers/capture/stereo_cameras/phase.hpp"
+#include "drivers/capture/stereo_cameras/rate_steering.hpp"
 #include "drivers/trigger/pairer.hpp"
 #include "drivers/trigger/pulse_matcher.hpp"
 #include "drivers/trigger/trigger.hpp"
@@ -46,7 +47,10 @@ namespace stereotrack::capture {
 /// * no frame answers a pulse for `timeout`: the cameras do not follow the trigger, or with another delay. Frames pair
 ///   without pulses, until kConvincing in a row answer one;
 /// * a left frame, whose time is its pair's, bears one after its arrival: told once a camera; no result leaves on time;
-/// * a camera that comes back and delivers another size or format is refused.
+/// * a camera that comes back and delivers another size or format is refused;
+/// * two that nobody triggers and that are to `steer`: tend() holds the right one's rate to the left one's
+///   (RateSteering), where its driver can set the period while it streams. That driver's calls are made here, on the
+///   service thread; a camera is closed by the same thread, so none is called once it is gone.
 ///
 /// A lost camera is found within 0.1 s; pairs come again with the third frame of the one that is back, where sequences
 /// must be learnt anew (trigger::Pairer), else with the first.
@@ -66,6 +70,7 @@ class StereoCameras final : public LiveSource {
     bool side_by_side = false;  ///< the left one alone, whose picture holds both views: see side_by_side.hpp
     double tolerance = 0.25;
     bool triggered = false;
+    bool steer = false;  ///< not with `triggered`
     std::chrono::nanoseconds timeout{std::chrono::milliseconds(500)};
     std::chrono::nanoseconds back_off_first{std::chrono::milliseconds(500)};
     std::chrono::nanoseconds back_off_most{std::chrono::seconds(10)};
@@ -149,6 +154,7 @@ class StereoCameras final : public LiveSource {
     Counter stray;
 
     // ---- Service thread
+    Camera* serves = nullptr;  ///< for its service part alone: `camera`, `incoming` or `retired`; null: there is none
     bool is_wanted = false;
     MonotonicTime next_try{};
     std::chrono::nanoseconds back_off{0};
@@ -198,6 +204,8 @@ class StereoCameras final : public LiveSource {
   void reopen(Side side, std::vector<SourceNote>& notes);
   void say(const Event& event, std::vector<SourceNote>& notes);
   void estimate_phase() noexcept;
+  void steer(std::vector<SourceNote>& notes);
+  void say_steering(std::vector<SourceNote>& notes);
 
   Open open_;
   Config config_;
@@ -236,6 +244,11 @@ class StereoCameras final : public LiveSource {
   // Service thread's.
   std::vector<SourceNote> first_notes_;
   PhaseEstimator phase_;
+  RateSteering steering_;
+  CaptureTime steered_by_{};  ///< the last second that steering_ knows
+  RateSteering::State told_steering_ = RateSteering::State::kOff;
+  std::atomic<Steering> steering_state_{Steering::kOff};
+  std::atomic<std::int64_t> steered_period_ns_{kUnknown};
   std::atomic<std::int64_t> phase_ns_{kUnknown};
   std::atomic<std::int64_t> drift_ppb_{kUnknown};
   static constexpr std::int64_t kUnknown = INT64_MIN;

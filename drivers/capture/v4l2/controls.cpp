@@ -196,6 +196,29 @@ LineTiming line_timing(const Device& sensor, int width, int height) {
       height};
 }
 
+std::int64_t RowPeriod::blank_of(std::chrono::nanoseconds period) const noexcept {
+  return nearest_value(blank, std::chrono::duration<double, std::micro>(period) / timing.line - timing.rows);
+}
+
+std::chrono::nanoseconds RowPeriod::period_of(std::int64_t blank_rows) const noexcept {
+  return std::chrono::nanoseconds(
+      std::llround(1e3 * timing.line.count() * static_cast<double>(timing.rows + blank_rows)));
+}
+
+PeriodRange RowPeriod::range() const noexcept {
+  const auto step = static_cast<double>(std::max<std::int64_t>(blank.step, 1));
+  return {period_of(blank.minimum), period_of(blank.maximum),
+          std::chrono::nanoseconds(std::max(1LL, std::llround(1e3 * timing.line.count() * step)))};
+}
+
+std::optional<RowPeriod> row_period(const Device& sensor, const LineTiming& timing) {
+  if (!timing.known()) return std::nullopt;
+  const auto blank = find_control(sensor, V4L2_CID_VBLANK);
+  constexpr std::uint32_t kFixed = V4L2_CTRL_FLAG_READ_ONLY | V4L2_CTRL_FLAG_GRABBED | V4L2_CTRL_FLAG_DISABLED;
+  if (!blank || (blank->flags & kFixed) != 0 || blank->minimum >= blank->maximum) return std::nullopt;
+  return RowPeriod{*blank, timing};
+}
+
 bool SensorControls::changed(std::uint32_t id, std::int64_t value) noexcept {
   if (id == 0) return false;
   if (id == exposure_id_) {

@@ -62,6 +62,20 @@ struct LineTiming {
 };
 [[nodiscard]] LineTiming line_timing(const Device& sensor, int width, int height);
 
+/// Periods by the rows that a sensor does not read out, V4L2_CID_VBLANK: period = (rows + blank) line. Sensors take
+/// that between two frames while they stream, where their interval is refused or begins the stream anew.
+struct RowPeriod {
+  Control blank;
+  LineTiming timing;  ///< known
+
+  /// Rows that come nearest to the period, within the control's range.
+  [[nodiscard]] std::int64_t blank_of(std::chrono::nanoseconds period) const noexcept;
+  [[nodiscard]] std::chrono::nanoseconds period_of(std::int64_t blank_rows) const noexcept;
+  [[nodiscard]] PeriodRange range() const noexcept;
+};
+/// Empty: the sensor does not tell how it is read out, or its blank rows cannot be set, or not now.
+[[nodiscard]] std::optional<RowPeriod> row_period(const Device& sensor, const LineTiming& timing);
+
 /// The controls of one sensor that frames depend on. Made by set_controls().
 class SensorControls {
  public:

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
@@ -38,6 +39,13 @@ int Device::open(const std::string& path) noexcept {
     descriptor_ = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
   } while (descriptor_ < 0 && errno == EINTR);
   return descriptor_ < 0 ? errno : 0;
+}
+
+int Device::open_beside(const Device& other) noexcept {
+  if (!other.is_open()) return EBADF;
+  char path[32];
+  (void)std::snprintf(path, sizeof path, "/proc/self/fd/%d", other.descriptor());
+  return open(path);
 }
 
 void Device::close() noexcept {

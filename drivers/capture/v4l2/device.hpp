@@ -20,6 +20,9 @@ class Device {
 
   /// Opens for reading and writing, without waiting in any later call. 0, or errno.
   [[nodiscard]] int open(const std::string& path) noexcept;
+  /// The same node by a descriptor of its own: calls by one do not wait for calls by the other, and the other is told
+  /// of what this one changes. 0, or errno.
+  [[nodiscard]] int open_beside(const Device& other) noexcept;
   void close() noexcept;
 
   [[nodiscard]] bool is_open() const noexcept { return descriptor_ >= 0; }

@@ -92,6 +92,18 @@ std::string Stream::failure() const {
          (gone ? "check its plug and power, dmesg tells more" : "dmesg tells what its driver found; open it anew");
 }
 
+std::optional<PeriodRange> Stream::period_range() const noexcept {
+  return parts_.paces ? std::optional(parts_.paces->range()) : std::nullopt;
+}
+
+std::optional<std::chrono::nanoseconds> Stream::set_period(std::chrono::nanoseconds wanted) noexcept {
+  if (!parts_.paces) return std::nullopt;
+  const RowPeriod& paces = *parts_.paces;
+  if (write_control(parts_.pacer, paces.blank, paces.blank_of(wanted)) != 0) return std::nullopt;
+  const auto made = read_control(parts_.pacer, paces.blank.id);
+  return made ? std::optional(paces.period_of(*made)) : std::nullopt;
+}
+
 Camera::Counters Stream::counters() const noexcept {
   Counters counters;
   counters.frames = frames_.get();

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -86,6 +87,8 @@ class Stream final : public Camera {
     Device sensor;  ///< its sub-device; not open where it has none
     CameraInfo info;
     Layout layout;
+    Device pacer;                    ///< the sensor again, for who sets its period
+    std::optional<RowPeriod> paces;  ///< with `pacer`
     SensorControls controls;
     bool controls_on_sensor = false;
     int control_delay_frames = 1;
@@ -101,6 +104,9 @@ class Stream final : public Camera {
 
   [[nodiscard]] const CameraInfo& info() const noexcept override { return parts_.info; }
   void start() override;
+
+  [[nodiscard]] std::optional<PeriodRange> period_range() const noexcept override;
+  std::optional<std::chrono::nanoseconds> set_period(std::chrono::nanoseconds wanted) noexcept override;
 
   [[nodiscard]] int descriptor() const noexcept override { return parts_.node.descriptor(); }
   [[nodiscard]] Take take(SensorFrame& frame) noexcept override;

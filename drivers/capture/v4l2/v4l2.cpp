@@ -102,6 +102,7 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
 
   parts.info.name = name;
   parts.info.model = (sensor ? sensor->name : node.card) + ", " + node.bus;
+  if (sensor && parts.pacer.open_beside(exposes) == 0) parts.paces = row_period(parts.pacer, timing);
   if (sensor) parts.sensor = std::move(sensor->device);
   parts.info.width = layout.width;
   parts.info.height = layout.height;
