@@ -6,14 +6,14 @@ namespace stereotrack {
 
 namespace {
 
-constexpr std::align_val_t kLargePage{2 * 1024 * 1024};  // of x86-64, and of ARM with pages of 4 kB
-
 constexpr std::size_t rounded_up(std::size_t bytes, std::size_t to) noexcept { return (bytes + to - 1) / to * to; }
 
 // The address sanitizer sees a stage write into its neighbour's memory only where each request has a slab of its own.
 #if defined(__SANITIZE_ADDRESS__)
+constexpr std::align_val_t kBegin{Arena::kAlignment};
 constexpr std::size_t slab_for(std::size_t bytes) noexcept { return bytes; }
 #else
+constexpr std::align_val_t kBegin{2 * 1024 * 1024};  // a large page of x86-64, and of ARM with pages of 4 kB
 constexpr std::size_t slab_for(std::size_t bytes) noexcept { return rounded_up(bytes, Arena::kSlabBytes); }
 #endif
 
@@ -22,7 +22,7 @@ constexpr std::size_t slab_for(std::size_t bytes) noexcept { return rounded_up(b
 Arena::~Arena() {
   while (slabs_ != nullptr) {
     Slab* next = slabs_->next;
-    ::operator delete(slabs_, kLargePage);
+    ::operator delete(slabs_, kBegin);
     slabs_ = next;
   }
 }
@@ -42,7 +42,7 @@ void* Arena::take(std::size_t bytes) noexcept {
     return taken;
   }
   const std::size_t size = slab_for(kAlignment + bytes);
-  void* memory = ::operator new(size, kLargePage, std::nothrow);
+  void* memory = ::operator new(size, kBegin, std::nothrow);
   if (memory == nullptr) {
     failed_ = true;
     return nullptr;
