@@ -9,6 +9,7 @@
 #include "drivers/capture/synthetic/synthetic_source.hpp"
 #include "firmware-app/rig/rig.hpp"
 #include "firmware-app/runtime/clock.hpp"
+#include "firmware-app/runtime/large_pages.hpp"
 #include "firmware-app/stereotrack/doctor/measure.hpp"
 #include "firmware-app/stereotrack/doctor/threads.hpp"
 
@@ -157,7 +158,7 @@ class Player {
   capture::SourceInfo info_;
   StereoCalibration calibration_;
   std::vector<Drawn> drawn_;
-  Arena arena_;
+  Arena arena_{runtime::advise_large_pages};
   std::unique_ptr<Pipeline> pipeline_;
   std::vector<std::int64_t> compute_ns_;
   std::optional<Fault> refused_;
