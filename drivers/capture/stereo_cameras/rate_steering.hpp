@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "drivers/capture/camera.hpp"
+#include "drivers/capture/live_source.hpp"
 #include "pipeline/core/time.hpp"
 
 namespace stereotrack::capture {
@@ -39,14 +40,7 @@ class RateSteering {
   static constexpr int kMostRefusals = 10;    ///< in a row; fewer may be those of a camera that is being unplugged
   static constexpr int kDelayPeriods = 2;     ///< from set to the first frame that comes at another time
 
-  enum class State : std::uint8_t {
-    kOff,          ///< one camera is not there
-    kCannot,       ///< the camera cannot be steered: obstacle()
-    kMeasuring,    ///< nominal periods, until the drift is known
-    kApproaching,  ///< it is steered, and the phase is not small yet
-    kLocked,
-    kGivenUp,  ///< it does not do what is set
-  };
+  using State = Steering;  ///< kCannot: obstacle() says why; kMeasuring: at nominal periods
   enum class Obstacle : std::uint8_t {
     kNone,
     kNoControl,  ///< its driver cannot set the period

@@ -744,8 +744,7 @@ void StereoCameras::steer(std::vector<SourceNote>& notes) {
     }
   }
   say_steering(notes);
-  static_assert(static_cast<int>(Steering::kGivenUp) == static_cast<int>(State::kGivenUp));
-  steering_state_.store(static_cast<Steering>(steering_.state()), std::memory_order_relaxed);
+  steering_state_.store(steering_.state(), std::memory_order_relaxed);
   steered_period_ns_.store(steering_.state() >= State::kApproaching ? steering_.period().count() : kUnknown,
                            std::memory_order_relaxed);
 }

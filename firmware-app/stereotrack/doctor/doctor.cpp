@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <ostream>
@@ -99,7 +100,11 @@ class Doctor {
     if (has_cameras()) {
       say("cameras");
       const Pulses pulses(c);
-      if (!pulses.problem().empty()) f_.configuration_problems.push_back(pulses.problem());
+      // What the configuration's check has said already is not said again.
+      if (!pulses.problem().empty() && std::find(f_.configuration_problems.begin(), f_.configuration_problems.end(),
+                                                 pulses.problem()) == f_.configuration_problems.end()) {
+        f_.configuration_problems.push_back(pulses.problem());
+      }
       std::array<std::vector<std::string>, 2> notes;
       std::size_t side_opened = 0;
       const auto open = camera_opener(c.camera, [&](const std::string& note) { notes[side_opened].push_back(note); });

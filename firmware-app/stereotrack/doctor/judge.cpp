@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <string_view>
 
 #include "drivers/capture/v4l2/v4l2.hpp"
@@ -215,15 +213,16 @@ class Judge {
     ok("pwm", chips.empty() ? "none: pulses come from lines or from outside" : joined(chips, ", "));
   }
 
+  /// By one of its names.
+  [[nodiscard]] static bool is_called(const CameraFound& camera, const std::string& device) {
+    const capture::v4l2::CameraFacts& facts = camera.facts;
+    return !device.empty() && (device == facts.path || device == "bus:" + facts.bus || device == "name:" + facts.card ||
+                               std::find(facts.links.begin(), facts.links.end(), device) != facts.links.end());
+  }
+
   [[nodiscard]] bool uses(const CameraFound& camera) const {
-    const auto is_it = [&camera](const std::string& device) {
-      const capture::v4l2::CameraFacts& facts = camera.facts;
-      return !device.empty() &&
-             (device == facts.path || device == "bus:" + facts.bus || device == "name:" + facts.card ||
-              std::find(facts.links.begin(), facts.links.end(), device) != facts.links.end());
-    };
-    return f_.cameras_wanted &&
-           (is_it(f_.configuration.camera.left.device) || is_it(f_.configuration.camera.right.device));
+    const config::CameraConfig& wanted = f_.configuration.camera;
+    return f_.cameras_wanted && (is_called(camera, wanted.left.device) || is_called(camera, wanted.right.device));
   }
 
   void cameras() {
@@ -277,11 +276,7 @@ class Judge {
   }
 
   [[nodiscard]] std::string role_of(const CameraFound& camera) const {
-    const std::string& left = f_.configuration.camera.left.device;
-    const capture::v4l2::CameraFacts& facts = camera.facts;
-    const bool is_left = left == facts.path || left == "bus:" + facts.bus || left == "name:" + facts.card ||
-                         std::find(facts.links.begin(), facts.links.end(), left) != facts.links.end();
-    return is_left ? "left" : "right";
+    return is_called(camera, f_.configuration.camera.left.device) ? "left" : "right";
   }
 
   void configuration() {
