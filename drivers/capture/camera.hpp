@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -10,6 +11,26 @@
 #include "pipeline/frame.hpp"
 
 namespace stereotrack::capture {
+
+/// What is wanted of one sensor, whoever drives it. What is not said stays as its driver has it.
+struct CameraSettings {
+  std::string device;                 ///< its name, as its driver knows it
+  int width = 0;                      ///< [px]; 0 with height 0: as the driver has it
+  int height = 0;                     ///< [px]
+  std::string format = "auto";        ///< a name of the driver's format_names(); auto: grey, where there is none the
+                                      ///< cheapest to read
+  double fps = 0;                     ///< 0: as the driver has it
+  int buffers = 8;                    ///< wanted; it may become others. FramePool's slots and two, at least
+  std::optional<double> exposure_us;  ///< automatic exposure is switched off with it
+  std::optional<double> gain;         ///< 1 = none; automatic gain is switched off with it
+  std::optional<double> readout_us;   ///< from the end of the exposure to the end of the frame; each driver says when
+                                      ///< it wants to know
+};
+
+/// Of settings in microseconds, to the nearest nanosecond.
+[[nodiscard]] inline std::chrono::nanoseconds from_us(double us) noexcept {
+  return std::chrono::nanoseconds(std::llround(us * 1000));
+}
 
 /// What one sensor delivers, known once it is open.
 struct CameraInfo {

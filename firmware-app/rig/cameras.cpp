@@ -7,6 +7,8 @@
 
 #include "config/error.hpp"
 #include "config/milliseconds.hpp"
+#include "drivers/capture/libcamera/libcamera.hpp"
+#include "drivers/capture/v4l2/v4l2.hpp"
 #include "firmware-app/rig/trigger.hpp"
 
 namespace stereotrack {
@@ -40,42 +42,34 @@ std::string line_of(Side side, const capture::CameraInfo& info) {
          capture::delivery_text(info) + " at " + rate + " frames/s";
 }
 
-}  // namespace
-
-capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, Side side) {
-  capture::v4l2::Settings settings;
-  const config::CameraDeviceConfig& of_side = side == Side::kLeft ? camera.left : camera.right;
-  settings.device = of_side.device;
-  settings.sensor = of_side.sensor;
+/// What each driver is asked for.
+capture::CameraSettings settings_of(const config::CameraConfig& camera, Side side) {
+  capture::CameraSettings settings;
+  settings.device = (side == Side::kLeft ? camera.left : camera.right).device;
   settings.width = camera.width;
   settings.height = camera.height;
   settings.format = camera.format;
   settings.fps = camera.fps;
   settings.buffers = camera.buffers;
+  settings.exposure_us = set_by_user(camera.exposure_us);
+  settings.gain = set_by_user(camera.gain);
+  settings.readout_us = set_by_user(camera.readout_us);
+  return settings;
+}
+
+capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, Side side) {
+  capture::v4l2::Settings settings;
+  static_cast<capture::CameraSettings&>(settings) = settings_of(camera, side);
+  settings.sensor = (side == Side::kLeft ? camera.left : camera.right).sensor;
   settings.heap = camera.heap;
   if (camera.memory == config::CameraMemory::kDmabuf) {
     settings.memory = camera.heap.empty() ? capture::v4l2::Memory::kExported : capture::v4l2::Memory::kImported;
   }
-  settings.exposure_us = set_by_user(camera.exposure_us);
-  settings.gain = set_by_user(camera.gain);
   if (camera.black_level >= 0) settings.black_level = camera.black_level;
-  settings.readout_us = set_by_user(camera.readout_us);
   return settings;
 }
 
-capture::libcamera::Settings libcamera_settings(const config::CameraConfig& camera, Side side) {
-  capture::libcamera::Settings settings;
-  settings.device = side == Side::kLeft ? camera.left.device : camera.right.device;
-  settings.width = camera.width;
-  settings.height = camera.height;
-  settings.format = camera.format;
-  settings.fps = camera.fps;
-  settings.buffers = camera.buffers;
-  settings.exposure_us = set_by_user(camera.exposure_us);
-  settings.gain = set_by_user(camera.gain);
-  settings.readout_us = set_by_user(camera.readout_us);
-  return settings;
-}
+}  // namespace
 
 capture::StereoCameras::Config pairing_config(const config::Configuration& configuration) {
   const config::CameraConfig& camera = configuration.camera;
@@ -101,7 +95,7 @@ capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
   return [camera, say = std::move(say)](Side side) {
     std::vector<std::string> notes;
     std::unique_ptr<capture::Camera> opened = is_libcamera(camera)
-                                                  ? capture::libcamera::open(libcamera_settings(camera, side), &notes)
+                                                  ? capture::libcamera::open(settings_of(camera, side), &notes)
                                                   : capture::v4l2::open(v4l2_settings(camera, side), &notes);
     for (const std::string& note : notes) say(note);
     return opened;

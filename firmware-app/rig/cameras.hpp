@@ -7,18 +7,12 @@
 #include <vector>
 
 #include "config/load.hpp"
-#include "drivers/capture/libcamera/libcamera.hpp"
 #include "drivers/capture/stereo_cameras/stereo_cameras.hpp"
-#include "drivers/capture/v4l2/v4l2.hpp"
 
 namespace stereotrack {
 
 /// The source.name of cameras.
 inline constexpr std::string_view kCameras = "cameras";
-
-/// What the camera.* keys ask of one sensor, by driver.
-[[nodiscard]] capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, trigger::Side side);
-[[nodiscard]] capture::libcamera::Settings libcamera_settings(const config::CameraConfig& camera, trigger::Side side);
 
 /// How two of them become pairs.
 [[nodiscard]] capture::StereoCameras::Config pairing_config(const config::Configuration& configuration);

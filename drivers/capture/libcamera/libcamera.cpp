@@ -19,8 +19,6 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-nanoseconds from_us(double us) { return nanoseconds(std::llround(us * 1000)); }
-
 std::string number_text(double number) {
   char text[32];
   (void)std::snprintf(text, sizeof text, "%.4g", number);

@@ -20,20 +20,9 @@
 /// called by one thread at a time.
 namespace stereotrack::capture::libcamera {
 
-/// What is wanted of one sensor. What is not said stays as libcamera has it.
-struct Settings {
-  std::string device;           ///< id, or what only its id or model has; or its place in list_cameras() from 0, which
-                                ///< may be another after a camera was unplugged
-  int width = 0;                ///< [px]; 0 with height 0: as libcamera has it
-  int height = 0;               ///< [px]
-  std::string format = "auto";  ///< a name of format_names(); auto: grey, where there is none the cheapest to read
-  double fps = 0;               ///< frames are held to this rate; 0: as libcamera has it
-  int buffers = 8;              ///< wanted; the camera may have it otherwise. FramePool's slots and two, at least
-  std::optional<double> exposure_us;  ///< automatic exposure is switched off with it
-  std::optional<double> gain;         ///< 1 = none; automatic gain is switched off with it
-  std::optional<double> readout_us;   ///< from the end of the exposure to the end of the frame. Of use only where
-                                      ///< stamps are of no clock of ours: see clock_finder.hpp
-};
+/// device: id, place in list_cameras() from 0, or what only its id or model has. fps: frames are held to this rate.
+/// readout_us: of use only where stamps are of no clock of ours, see clock_finder.hpp.
+using Settings = CameraSettings;
 
 /// Opens and sets up one sensor; start() makes it stream.
 /// Throws std::runtime_error with one line that names the device and the way out: no module, and why none; none or

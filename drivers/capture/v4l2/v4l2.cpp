@@ -17,8 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::chrono::nanoseconds from_us(double us) { return std::chrono::nanoseconds(std::llround(us * 1000)); }
-
 /// Names of udev's making for the node.
 std::vector<std::string> links_to(const std::string& path) {
   std::vector<std::string> links;

@@ -19,22 +19,13 @@ enum class Memory : std::uint8_t {
   kImported,  ///< dma-bufs of Settings::heap, which the device writes to, with the same around each lease
 };
 
-/// What is wanted of one sensor. What is not said stays as the driver has it.
-struct Settings {
-  std::string device;  ///< /dev/video0, a link to it (/dev/v4l/by-path/...), bus:platform:vivid-000, name:CARD
+/// device: /dev/video0, a link to it (/dev/v4l/by-path/...), bus:platform:vivid-000, name:CARD. readout_us: where the
+/// driver stamps the end of a frame; not said: see stamp_notes below.
+struct Settings : CameraSettings {
   std::string sensor;  ///< where the driver has the program connect the camera's parts (media controller): the sensor's
                        ///< name, or how it begins. Empty: the one that is connected, or the nearest
-  int width = 0;       ///< [px]; 0 with height 0: as the driver has it
-  int height = 0;      ///< [px]
-  std::string format = "auto";  ///< a name of format_names(); auto: grey, where there is none the cheapest to read
-  double fps = 0;               ///< 0: as the driver has it
-  int buffers = 8;              ///< wanted; the driver may need more. FramePool's slots and two, at least
-  std::optional<double> exposure_us;  ///< automatic exposure is switched off with it
-  std::optional<double> gain;         ///< 1 = none; automatic gain is switched off with it
-  std::optional<int> black_level;     ///< in the driver's own unit
-  std::optional<double> readout_us;   ///< from the end of the exposure to the end of the frame, where the driver stamps
-                                      ///< the latter. Not said: see stamp_notes below
-  int control_delay_frames = 2;       ///< from a change of a control to the first frame that was exposed with it
+  std::optional<int> black_level;  ///< in the driver's own unit
+  int control_delay_frames = 2;    ///< from a change of a control to the first frame that was exposed with it
   Memory memory = Memory::kMapped;
   std::string heap;  ///< of kImported: a dma-heap of the kernel's, /dev/dma_heap/system, or /dev/udmabuf: memory of the
                      ///< process. A device that wants its memory in one piece takes linux,cma or reserved alone
