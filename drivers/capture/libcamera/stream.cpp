@@ -56,8 +56,8 @@ void Stream::start() {
 
 std::string Stream::failure() const {
   if (loss_ == nullptr) return {};
-  return "camera " + parts_.info.name + " (" + parts_.info.model + "): after " + std::to_string(frames_.get()) +
-         " frames it " + loss_;
+  return "camera " + parts_.info.name + " (" + parts_.info.model + "): after " +
+         std::to_string(counters_.get().frames) + " frames it " + loss_;
 }
 
 }  // namespace stereotrack::capture::libcamera

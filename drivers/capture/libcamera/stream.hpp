@@ -9,11 +9,11 @@
 #include <string>
 
 #include "drivers/capture/camera.hpp"
+#include "drivers/capture/camera_counters.hpp"
 #include "drivers/capture/libcamera/clock_finder.hpp"
 #include "drivers/capture/libcamera/loader.hpp"
 #include "drivers/capture/libcamera/module.h"
 #include "drivers/capture/sequence_count.hpp"
-#include "pipeline/core/counter.hpp"
 
 namespace stereotrack::capture::libcamera {
 
@@ -70,10 +70,7 @@ class Stream final : public Camera {
   const char* loss_ = nullptr;
 
   std::atomic<std::int64_t> offset_ns_{0};
-  Counter frames_;
-  Counter damaged_;
-  Counter lost_;
-  Counter steps_;
+  CameraCounters counters_;
 };
 
 /// Throws std::runtime_error: "camera NAME: WHAT".

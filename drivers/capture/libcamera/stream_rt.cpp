@@ -43,7 +43,7 @@ Camera::Take Stream::take(SensorFrame& frame) noexcept {
   } else {
     start -= before;
   }
-  if (finder_.frame(start, nanoseconds(told.completed_time), exposure)) steps_.add();
+  const bool step = finder_.frame(start, nanoseconds(told.completed_time), exposure);
   offset_ns_.store(finder_.offset().count(), std::memory_order_relaxed);
 
   const SequenceCount::Frame counted = sequence_.next(told.sequence);
@@ -53,19 +53,10 @@ Camera::Take Stream::take(SensorFrame& frame) noexcept {
   frame.buffer = told.buffer;
   frame.damaged = told.is_damaged != 0 || (told.bytes != 0 && told.bytes < bytes_);
 
-  frames_.add();
-  damaged_.add(frame.damaged ? 1 : 0);
-  lost_.add(counted.lost);
+  counters_.frame(frame.damaged, counted.lost, step);
   return Take::kFrame;
 }
 
-Camera::Counters Stream::counters() const noexcept {
-  Counters counters;
-  counters.frames = frames_.get();
-  counters.damaged = damaged_.get();
-  counters.lost = lost_.get();
-  counters.steps = steps_.get();
-  return counters;
-}
+Camera::Counters Stream::counters() const noexcept { return counters_.get(); }
 
 }  // namespace stereotrack::capture::libcamera

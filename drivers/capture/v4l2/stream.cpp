@@ -88,7 +88,7 @@ std::string Stream::failure() const {
   if (!lost_) return {};
   const bool gone = loss_error_ == ENODEV || loss_error_ == ENXIO || loss_error_ == EINVAL;
   return "camera " + parts_.info.name + " (" + parts_.info.model + "): " + loss_ + " (" + error_text(loss_error_) +
-         ", errno " + std::to_string(loss_error_) + ") after " + std::to_string(frames_.get()) + " frames: " +
+         ", errno " + std::to_string(loss_error_) + ") after " + std::to_string(counters_.get().frames) + " frames: " +
          (gone ? "check its plug and power, dmesg tells more" : "dmesg tells what its driver found; open it anew");
 }
 
@@ -104,13 +104,6 @@ std::optional<std::chrono::nanoseconds> Stream::set_period(std::chrono::nanoseco
   return made ? std::optional(paces.period_of(*made)) : std::nullopt;
 }
 
-Camera::Counters Stream::counters() const noexcept {
-  Counters counters;
-  counters.frames = frames_.get();
-  counters.damaged = damaged_.get();
-  counters.lost = lost_frames_.get();
-  counters.steps = steps_.get();
-  return counters;
-}
+Camera::Counters Stream::counters() const noexcept { return counters_.get(); }
 
 }  // namespace stereotrack::capture::v4l2

@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "drivers/capture/camera.hpp"
+#include "drivers/capture/camera_counters.hpp"
 #include "drivers/capture/sequence_count.hpp"
 #include "drivers/capture/v4l2/controls.hpp"
 #include "drivers/capture/v4l2/device.hpp"
 #include "drivers/capture/v4l2/layout.hpp"
 #include "drivers/capture/v4l2/settings_in_force.hpp"
 #include "drivers/capture/v4l2/stamps.hpp"
-#include "pipeline/core/counter.hpp"
 
 namespace stereotrack::capture::v4l2 {
 
@@ -146,11 +146,7 @@ class Stream final : public Camera {
   const char* loss_ = "";  ///< why
   int loss_error_ = 0;
 
-  // One writer, the capture thread.
-  Counter frames_;
-  Counter damaged_;
-  Counter lost_frames_;
-  Counter steps_;
+  CameraCounters counters_;
 };
 
 }  // namespace stereotrack::capture::v4l2

@@ -135,10 +135,7 @@ Camera::Take Stream::take(SensorFrame& frame) noexcept {
 
   frame.damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || !place_picture(buffer);
 
-  frames_.add();
-  damaged_.add(frame.damaged ? 1 : 0);
-  lost_frames_.add(counted.lost);
-  steps_.add(stamp.step ? 1 : 0);
+  counters_.frame(frame.damaged, counted.lost, stamp.step);
   return Take::kFrame;
 }
 

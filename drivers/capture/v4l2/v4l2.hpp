@@ -48,6 +48,11 @@ struct CameraFacts {
     int width = 0, height = 0;          ///< [px]
     int max_width = 0, max_height = 0;  ///< the same, where it is no range
     std::vector<double> rates;          ///< frames a second; of a range the highest and the lowest
+
+    [[nodiscard]] bool includes(int wanted_width, int wanted_height) const noexcept {
+      return width <= wanted_width && wanted_width <= max_width && height <= wanted_height &&
+             wanted_height <= max_height;
+    }
   };
   struct Format {
     std::string fourcc;

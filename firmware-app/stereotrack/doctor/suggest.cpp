@@ -29,16 +29,11 @@ struct Resolution {
   [[nodiscard]] std::int64_t area() const { return std::int64_t{width} * height; }
 };
 
-bool offers(const Size& size, const Resolution& wanted) {
-  return size.width <= wanted.width && wanted.width <= size.max_width && size.height <= wanted.height &&
-         wanted.height <= size.max_height;
-}
-
 const Size* find_size(const CameraFacts& camera, std::string_view format, const Resolution& wanted) {
   for (const CameraFacts::Format& each : camera.formats) {
     if (each.name != format) continue;
     for (const Size& size : each.sizes) {
-      if (offers(size, wanted)) return &size;
+      if (size.includes(wanted.width, wanted.height)) return &size;
     }
   }
   return nullptr;

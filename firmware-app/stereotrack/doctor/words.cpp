@@ -99,9 +99,8 @@ double suggested_readout_us(const Findings& findings, const CaptureMeasure& meas
     for (const CameraFound& found : findings.found.cameras) {
       for (const CameraFacts::Format& format : found.facts.formats) {
         for (const CameraFacts::Size& size : format.sizes) {
-          const bool is_it = measure.name.find(found.facts.path) != std::string::npos && size.width <= camera.width &&
-                             camera.width <= size.max_width && size.height <= camera.height &&
-                             camera.height <= size.max_height;
+          const bool is_it =
+              measure.name.find(found.facts.path) != std::string::npos && size.includes(camera.width, camera.height);
           if (is_it && fastest(size) > 0) in_force_us = std::min(in_force_us, 1e6 / fastest(size));
         }
       }
