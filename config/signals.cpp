@@ -63,8 +63,7 @@ std::vector<Key> keys_of_signal(SignalConfig& signal) {
       key("pulse_ms", signal.pulse_ms, 0, 60000, "ms", "Width of a pulse."),
       key("hold_ms", signal.hold_ms, 0, 60000, "ms",
           "A condition that began to hold counts as holding for at least so long: flicker is one activation."),
-      key("active", signal.active, {{"high", ActiveLevel::kHigh}, {"low", ActiveLevel::kLow}},
-          "Level of the line when it is active."),
+      active_key("active", signal.active, "Level of the line when it is active."),
       key("safe", signal.safe, {{"inactive", SafeState::kInactive}, {"active", SafeState::kActive}},
           "State of the line at start, at stop, and while what it tells is not known."),
   };
@@ -79,14 +78,9 @@ std::vector<Key> keys_of_input(InputConfig& input) {
       key("edge", input.edge,
           {{"rising", InputEdge::kRising}, {"falling", InputEdge::kFalling}, {"both", InputEdge::kBoth}},
           "Which edges count: becoming active, inactive, or both."),
-      key("active", input.active, {{"high", ActiveLevel::kHigh}, {"low", ActiveLevel::kLow}},
-          "Level of the line when it is active."),
-      key("bias", input.bias,
-          {{"as_is", InputBias::kAsIs},
-           {"none", InputBias::kNone},
-           {"pull_up", InputBias::kPullUp},
-           {"pull_down", InputBias::kPullDown}},
-          "What the chip holds the line's level with where nothing drives it; not every chip can."),
+      active_key("active", input.active, "Level of the line when it is active."),
+      bias_key("bias", input.bias,
+               "What the chip holds the line's level with where nothing drives it; not every chip can."),
       key("debounce_ms", input.debounce_ms, 0, 1000, "ms",
           "A level counts once it was still for so long. Needs a build with libgpiod 2.x."),
       key("apart_ms", input.apart_ms, 0, 3600000, "ms",
@@ -180,6 +174,19 @@ std::string check_line(std::string_view text) {
   if (good) return {};
   return quoted(text) +
          " is no GPIO line: write CHIP:LINE, for example \"gpiochip0:17\", \"pinctrl-bcm2711:GPIO17\" or \"sim:near\"";
+}
+
+Key active_key(std::string_view name, ActiveLevel& member, std::string_view doc) {
+  return key(name, member, {{"high", ActiveLevel::kHigh}, {"low", ActiveLevel::kLow}}, doc);
+}
+
+Key bias_key(std::string_view name, InputBias& member, std::string_view doc) {
+  return key(name, member,
+             {{"as_is", InputBias::kAsIs},
+              {"none", InputBias::kNone},
+              {"pull_up", InputBias::kPullUp},
+              {"pull_down", InputBias::kPullDown}},
+             doc);
 }
 
 Key zones_key(std::vector<ZoneConfig>& zones) {

@@ -19,6 +19,10 @@ inline constexpr std::size_t kMaxCorners = 16;  ///< of a zone in the picture
 /// Why this is not CHIP:LINE; empty: it is. Whether there is such a line shows when it is asked for.
 [[nodiscard]] std::string check_line(std::string_view text);
 
+/// Keys of any line: the level at which it is active, and what holds one that nothing drives.
+[[nodiscard]] Key active_key(std::string_view name, ActiveLevel& member, std::string_view doc);
+[[nodiscard]] Key bias_key(std::string_view name, InputBias& member, std::string_view doc);
+
 /// [[zone]], [[signal]] and [[input]], for the table in schema.cpp.
 [[nodiscard]] Key zones_key(std::vector<ZoneConfig>& zones);
 [[nodiscard]] Key signals_key(std::vector<SignalConfig>& signals);
