@@ -3,6 +3,32 @@
 unit=stereotrackd
 figures=/run/results/figures.prom
 
+# LEFT RIGHT [MORE]: two cameras of vivid's, ten pairs a second, with the calibration of /run/scene; MORE is TOML.
+vivid_rig() {
+  cat >/run/rig.toml <<END
+[source]
+name = "cameras"
+[camera]
+left.device = "$1"
+right.device = "$2"
+width = 320
+height = 180
+format = "grey8"
+fps = 10.0
+tolerance = 0.5
+timeout_ms = 1000
+# vivid stamps what it calls the end of a frame, nine tenths of a period after the frame has come.
+readout_us = 90000
+[calibration]
+file = "/run/scene/calibration.yml"
+[latency]
+output_ms = 150.0
+[metrics]
+file = "$figures"
+${3:-}
+END
+}
+
 # [SYSTEMD-RUN OPTION...]
 start() {
   rm -f "$figures"

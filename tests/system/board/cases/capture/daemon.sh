@@ -7,27 +7,7 @@ source /payload/.board/tap.sh
 # shellcheck source=tests/system/board/guest/daemon.sh
 source /payload/.board/daemon.sh
 
-cat >/run/rig.toml <<END
-[source]
-name = "cameras"
-[camera]
-left.device = "bus:platform:vivid-000"
-right.device = "bus:platform:vivid-001"
-width = 320
-height = 180
-format = "grey8"
-fps = 10.0
-tolerance = 0.5
-timeout_ms = 1000
-# vivid stamps what it calls the end of a frame, nine tenths of a period after the frame has come.
-readout_us = 90000
-[calibration]
-file = "/run/scene/calibration.yml"
-[latency]
-output_ms = 150.0
-[metrics]
-file = "/run/results/figures.prom"
-END
+vivid_rig bus:platform:vivid-000 bus:platform:vivid-001
 
 # Both cameras are one platform device.
 unplug() { echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind; }

@@ -8,30 +8,6 @@ source /payload/.board/tap.sh
 # shellcheck source=tests/system/board/guest/daemon.sh
 source /payload/.board/daemon.sh
 
-# LEFT_DEVICE RIGHT_DEVICE
-write_config() {
-  cat >/run/rig.toml <<END
-[source]
-name = "cameras"
-[camera]
-left.device = "$1"
-right.device = "$2"
-width = 320
-height = 180
-format = "grey8"
-fps = 10.0
-tolerance = 0.5
-timeout_ms = 1000
-# vivid stamps what it calls the end of a frame, nine tenths of a period after the frame has come.
-readout_us = 90000
-[calibration]
-file = "/run/scene/calibration.yml"
-[latency]
-output_ms = 150.0
-[metrics]
-file = "/run/results/figures.prom"
-END
-}
 set_control() { v4l2-ctl -d "$1" -c "$2"; }
 of() { echo "stereotrack_camera_$1{camera=\"$2\"${3:+,fate=\"$3\"}}"; }
 paired='stereotrack_pairing_total{verdict="paired"}'
@@ -42,14 +18,14 @@ missing_right='stereotrack_pairing_total{verdict="missing_right"}'
 
 # ---- Cameras that are not there when the daemon starts: none, then the left one, then the right one.
 unit=none
-write_config /run/left /run/right
+vivid_rig /run/left /run/right
 # shellcheck disable=SC2119  # no options
 refused() { ! start 2>/dev/null; }
 fact "without any camera it does not start" refused
 fact "and names the first, and those there are" says 'camera /run/left: is not there: plug it in.*there is /dev/video0'
 systemctl reset-failed
 
-write_config /run/left /dev/video1
+vivid_rig /run/left /dev/video1
 unit=early
 fact "it starts without the left camera" start
 fact "and tells of it, and what that means" eventually says '/run/left.*no pair comes until the left camera does: tries again'
@@ -60,7 +36,7 @@ fact "it is found, and told, the left one" eventually says 'left camera: is back
 fact "and pairs come of both" rises "$paired" 5
 fact "the daemon that waited ends" stop
 
-write_config /dev/video0 /run/right
+vivid_rig /dev/video0 /run/right
 unit=late
 fact "it starts without the right camera" start
 fact "and tells of it, with the way on" eventually says '/run/right.*goes on with the left camera alone, in mono, and tries again'
@@ -73,7 +49,7 @@ fact "and pairs come" rises "$paired" 5
 fact "the daemon ends" stop
 
 # ---- Errors while it runs.
-write_config /dev/video0 /dev/video1
+vivid_rig /dev/video0 /dev/video1
 unit=faults
 fact "it starts on both" start
 fact "pairs come" eventually over "$paired" 5

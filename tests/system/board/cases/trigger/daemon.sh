@@ -9,28 +9,8 @@ source /payload/.board/tap.sh
 source /payload/.board/daemon.sh
 
 configure() {
-  cat >/run/rig.toml <<END
-[source]
-name = "cameras"
-[camera]
-left.device = "bus:platform:vivid-000"
-right.device = "bus:platform:vivid-001"
-width = 320
-height = 180
-format = "grey8"
-fps = 10.0
-tolerance = 0.5
-timeout_ms = 1000
-readout_us = 90000
-[trigger]
-$1
-[calibration]
-file = "/run/scene/calibration.yml"
-[latency]
-output_ms = 150.0
-[metrics]
-file = "/run/results/figures.prom"
-END
+  vivid_rig bus:platform:vivid-000 bus:platform:vivid-001 "[trigger]
+$1"
 }
 check_says() {
   local said
