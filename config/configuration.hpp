@@ -151,6 +151,7 @@ struct MetricsConfig {
 
 struct ServiceConfig {
   std::string state_directory;  ///< empty: $STATE_DIRECTORY, else ~/.local/state/stereotrack
+  bool log_targets = true;      ///< a line of the log for each target that comes or goes
 };
 
 struct CalibrationConfig {

@@ -185,6 +185,9 @@ std::vector<Key> keys_of(Configuration& c) {
       key("service.state_directory", c.service.state_directory, nullptr,
           "Where the number of the session is kept; empty: $STATE_DIRECTORY, which systemd sets, else "
           "~/.local/state/stereotrack."),
+      key("service.log_targets", c.service.log_targets,
+          "A line of the log for each target that is confirmed and each that is gone, with its number in the journal's "
+          "field STEREOTRACK_TRACK; 20 lines a second at most, the others are counted in one."),
 
       key("calibration.file", c.calibration.file, nullptr,
           "Calibration of the rig that stereotrackd watches; a synthetic scene has its own."),

@@ -134,6 +134,7 @@ Daemon::Daemon(Parts parts)
                                                           .period = info.period,
                                                           .also = parts.also},
                                         *effort, pool_, *mailbox_, bell_, *source_, *vitals_);
+  frames_->tell(&target_notes_);
   pipeline_ = std::make_unique<Pipeline>(
       make_pipeline(configuration.pipeline, parts.calibration, info, arena_, frames_->observer()));
   arena_.seal();

@@ -20,6 +20,7 @@
 #include "firmware-app/stereotrackd/inputs.hpp"
 #include "firmware-app/stereotrackd/line_care.hpp"
 #include "firmware-app/stereotrackd/publisher_rt.hpp"
+#include "firmware-app/stereotrackd/target_notes.hpp"
 #include "firmware-app/stereotrackd/vitals.hpp"
 #include "pipeline/core/arena.hpp"
 #include "pipeline/pipeline.hpp"
@@ -100,6 +101,9 @@ class Daemon {
     return notes;
   }
 
+  /// Targets that came or went, for the log; the service thread's.
+  [[nodiscard]] TargetNotes& target_notes() noexcept { return target_notes_; }
+
   /// SIGHUP's file was wrong.
   void count_refused_reload() noexcept { vitals_->reloads_refused.add(); }
 
@@ -131,6 +135,7 @@ class Daemon {
   capture::Doorbell bell_;
   capture::PairOutlet outlet_;
   std::unique_ptr<OutcomeMailbox> mailbox_;
+  TargetNotes target_notes_;
   Arena arena_{runtime::advise_large_pages};
   std::unique_ptr<FrameLoop> frames_;
   std::unique_ptr<Pipeline> pipeline_;

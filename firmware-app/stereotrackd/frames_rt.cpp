@@ -52,6 +52,7 @@ void FrameLoop::process(Pipeline& pipeline, capture::PairLease lease) noexcept {
   }
   mailbox_.publish();
   bell_.ring();
+  if (notes_ != nullptr) notes_->update(result->tracks);
   // After the result has gone out: what the box takes delays the next pair, and counts against its budget.
   if (box_ != nullptr) {
     decisions_.shed = result->left_out;

@@ -8,6 +8,7 @@
 #include "drivers/record/black_box.hpp"
 #include "firmware-app/runtime/effort.hpp"
 #include "firmware-app/stereotrackd/outcome.hpp"
+#include "firmware-app/stereotrackd/target_notes.hpp"
 #include "firmware-app/stereotrackd/vitals.hpp"
 #include "pipeline/pipeline.hpp"
 
@@ -45,6 +46,9 @@ class FrameLoop {
   /// Keeps what it does from now on; before run().
   void keep_in(record::BlackBox* box) noexcept { box_ = box; }
 
+  /// Told of each result; before run().
+  void tell(TargetNotes* notes) noexcept { notes_ = notes; }
+
   /// For Pipeline::create(): ends the lease, measures the stages.
   [[nodiscard]] StageObserver observer() noexcept { return {&FrameLoop::stage_ended, this}; }
 
@@ -64,6 +68,7 @@ class FrameLoop {
   const capture::LiveSource& source_;
   Vitals& vitals_;
   record::BlackBox* box_ = nullptr;  ///< null: nothing is kept
+  TargetNotes* notes_ = nullptr;     ///< null: nobody is told
   record::FrameDecisions decisions_;
   capture::PairLease lease_;
   MonotonicTime stage_began_{};

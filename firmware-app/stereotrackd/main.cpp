@@ -271,6 +271,8 @@ int run(const Arguments& arguments) {
   daemon::Service service(
       {.metrics = configuration.metrics,
        .session = session,
+       .log_targets = configuration.service.log_targets,
+       .unit_m = rig.unit_m,
        .summary = summary_of(info, configuration, session),
        .reload = [&] { daemon::reload(arguments.config, arguments.set, rig.unit_m, configuration, daemon); },
        .record = [&] { record_now(configuration, daemon); }});

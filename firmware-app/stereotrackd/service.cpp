@@ -20,6 +20,7 @@ namespace stereotrack::daemon {
 namespace {
 
 constexpr std::chrono::milliseconds kRound{100};
+constexpr int kTargetLines = 20;  // a second: a swarm must not fill a disk
 
 sigset_t signals_of_the_service() {
   sigset_t wanted;
@@ -173,7 +174,30 @@ void Service::tend(Daemon& daemon) {
   }
 }
 
-void Service::every_second(const Daemon& daemon) {
+void Service::log_targets(Daemon& daemon) {
+  TargetNote note;
+  while (daemon.target_notes().take(note)) {
+    if (!config_.log_targets) continue;
+    if (++target_lines_ > kTargetLines) {
+      ++targets_not_told_;
+      continue;
+    }
+    log(LogLevel::kInfo, text_of(note, config_.unit_m),
+        {{"STEREOTRACK_CAUSE", "target"}, {"STEREOTRACK_TRACK", std::to_string(note.id)}});
+  }
+}
+
+void Service::every_second(Daemon& daemon) {
+  target_lines_ = 0;
+  log_targets(daemon);
+  const std::uint64_t left_out = daemon.target_notes().left_out();
+  targets_not_told_ += config_.log_targets ? left_out - target_notes_left_out_ : 0;
+  target_notes_left_out_ = left_out;
+  if (targets_not_told_ > 0) {
+    log(LogLevel::kInfo, "targets came or went " + std::to_string(targets_not_told_) + " times more",
+        {{"STEREOTRACK_CAUSE", "target"}, {"STEREOTRACK_COUNT", std::to_string(targets_not_told_)}});
+    targets_not_told_ = 0;
+  }
   log_changes(daemon);
   const Vitals& vitals = daemon.vitals();
   (void)sd_notifyf(0, "STATUS=%s; %llu pairs, %llu targets, compute p99 %.1f ms, send error p99 %.0f us, health %llu",
@@ -206,6 +230,7 @@ void Service::run(Daemon& daemon) {
   while (take_signals() && !daemon.is_over()) {
     feed_watchdog(daemon);
     tend(daemon);
+    log_targets(daemon);
     if (Clock::now() >= next) {
       every_second(daemon);
       next = std::max(next + std::chrono::seconds(1), Clock::now());

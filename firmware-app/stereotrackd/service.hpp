@@ -26,6 +26,8 @@ class Service {
   struct Config {
     config::MetricsConfig metrics;
     std::uint64_t session = 0;
+    bool log_targets = true;       ///< a line for each that comes or goes
+    double unit_m = 0;             ///< metres in the calibration's unit; 0: not known
     std::string summary;           ///< one line for the log and systemd: what runs
     std::function<void()> reload;  ///< SIGHUP
     std::function<void()> record;  ///< SIGUSR1
@@ -45,9 +47,10 @@ class Service {
 
   /// False: it is time to go.
   [[nodiscard]] bool take_signals();
-  void every_second(const Daemon& daemon);
+  void every_second(Daemon& daemon);
   void log_changes(const Daemon& daemon);
   void tend(Daemon& daemon);
+  void log_targets(Daemon& daemon);
   void feed_watchdog(const Daemon& daemon);
 
   Config config_;
@@ -58,6 +61,9 @@ class Service {
   Clock::time_point fed_{};
   std::array<std::uint64_t, 4> beats_{};
   std::array<std::uint64_t, kScheduleCounters.size()> schedule_{};
+  int target_lines_ = 0;  // of this second
+  std::uint64_t targets_not_told_ = 0;
+  std::uint64_t target_notes_left_out_ = 0;
   std::uint64_t efforts_ = 0;
   std::uint64_t health_ = 0;
   std::uint64_t allocations_ = 0;

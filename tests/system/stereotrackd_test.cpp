@@ -193,6 +193,19 @@ TEST(Stereotrackd, SendsEachPairAndEndsWithTheFilm) {
   EXPECT_FALSE(fs::exists(folder / "state" / "last_states.txt")) << "it is written on a fault alone";
 }
 
+TEST(Stereotrackd, LogsEachTargetThatComesUnlessToldNotTo) {
+  const TempDir folder;
+  const std::string config = small(folder.path());
+  for (const char* logged : {"true", "false"}) {
+    const ProgramResult done =
+        run_program({kDaemon, "--config", config, "--set", "source.repeat=once", "--set", "synthetic.frames=60",
+                     "--set", "synthetic.width=320", "--set", "synthetic.height=240", "--set",
+                     std::string("service.log_targets=") + logged});
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+    EXPECT_EQ(done.err.find("stereotrackd: target 1 is there, at ") != std::string::npos, *logged == 't') << done.err;
+  }
+}
+
 TEST(Stereotrackd, SigtermEndsItCleanly) {
   const TempDir folder;
   Program daemon({kDaemon, "--config", small(folder.path())});
