@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Test programs for another CPU, in an emulator of one process.
 
-    emulated.py run --results FOLDER PROGRAM EMULATOR [ARGUMENT...]    all tests of a program but those that are left out
-    emulated.py report --results FOLDER [--part]                       counts what all programs ran; names what none ran
+    emulated.py run --results FOLDER PROGRAM EMULATOR [ARGUMENT...]    all tests of a program, less what is left out
+    emulated.py report --results FOLDER [--part]                       counts what all programs ran, and what none did
 
 Left out is what left_out.txt names, beside this file, and nothing else: a test that skips itself fails the report where
 ../expected_skips.txt does not name it, and so does a line of left_out.txt that leaves out nothing.
@@ -103,8 +103,8 @@ def report(args):
                 skipped.append((name, case.find("skipped").get("message").splitlines()[-1]))
             else:
                 passed += 1
-    print(f"emulated: {passed} tests passed, {len(failed)} failed, {len(skipped)} skipped, {sum(left.values())} left out, "
-          f"and {len(programs)} programs")
+    print(f"emulated: {passed} tests passed, {len(failed)} failed, {len(skipped)} skipped, {sum(left.values())} left "
+          f"out, and {len(programs)} programs")
     for name in failed:
         print(f"  failed {name}")
     for name, reason in skipped:
