@@ -497,6 +497,7 @@ void BlackBox::end() {
   }
   if (!writer_.commit()) throw std::runtime_error(writer_.status());
   count(counters_.recordings);
+  last_error_.clear();
   writing_.reset();
 }
 

@@ -340,6 +340,7 @@ TEST(BlackBox, FullDiskIsCountedAndTheNextRecordingIsWritten) {
   EXPECT_EQ(rig.counters().recordings, 1U);
   EXPECT_EQ(rig.counters().frames_dropped, 0U);
   EXPECT_GE(rig.replay(rig.box().last_recording()), 15);
+  EXPECT_EQ(rig.box().last_error(), "") << "a failure like the one before would not be news";
 }
 
 TEST(BlackBox, TheOldestRecordingsGoWhereThereAreTooMany) {
