@@ -64,7 +64,7 @@ class BlackBox {
     int reduce = 1;                     ///< 1, 2, 4
     int every = 1;                      ///< 1..100
     std::filesystem::path directory{};  ///< must exist; the recordings' names begin with kPrefix
-    std::uint64_t max_bytes = 0;  ///< of all recordings in it; the oldest go, where there are more
+    std::uint64_t max_bytes = 0;  ///< of all recordings in it; the oldest, by their names, go, where there are more
     int patience = 20;            ///< rounds of service_step() that wait for the messages of the last frames
     std::uint64_t spare_bytes = std::uint64_t{64} << 20U;  ///< stay free on the disk
   };
