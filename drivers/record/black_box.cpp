@@ -481,6 +481,8 @@ void BlackBox::write_some() {
     // Release: the frame loop may write the slot again; it has been read.
     released_.store(++write_next_, std::memory_order_release);
   }
+  // A power cut takes what lies in memory only: these frames stay.
+  if (!writer_.flush()) throw std::runtime_error(writer_.status());
 }
 
 void BlackBox::end() {
