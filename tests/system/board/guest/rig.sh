@@ -55,16 +55,28 @@ runs() { eventually over stereotrack_frames_total "${1:-5}"; }
 ready_after_us() { echo $(($(property ActiveEnterTimestampMonotonic) - $(property InactiveExitTimestampMonotonic))); }
 # CLOCK_MONOTONIC [us].
 now_us() { awk '{ printf "%d", $1 * 1000000 }' /proc/uptime; }
+# Each output left with its own result. Who is asked for figures keeps a processor of the emulator busy, and the publisher
+# from waking at once, now and then: after_due is no part of this.
+all_left() {
+  local cause
+  for cause in predicted_late predicted_superseded missing overslept_pairs overslept_missing without_state outages; do
+    is "stereotrack_outputs_total{cause=\"$cause\"}" 0 || return
+  done
+  none stereotrack_sent_late_total
+}
 restarted() { [[ $(property NRestarts) == "$1" ]]; }
 
+# A fact is asked in a shell of its own: what begins in one and ends in another is known by a file.
+is_gone() { ! kill -0 "$1" 2>/dev/null; }
+ends_at_term() { kill -TERM "$1" && eventually is_gone "$1"; }
 # Telemetry, from now on, until heard: /run/heard.bin.
 listen() {
   /payload/keep_telemetry listen 127.0.0.1:5701 /run/heard.bin >/run/results/listening.txt 2>&1 &
-  listener=$!
+  echo $! >/run/listener
   eventually grep -q listening /run/results/listening.txt
 }
 heard() {
-  kill -TERM "$listener" && wait "$listener" && /payload/keep_telemetry sessions /run/heard.bin >/run/sessions.txt
+  ends_at_term "$(</run/listener)" && /payload/keep_telemetry sessions /run/heard.bin >/run/sessions.txt
 }
 # Of what was heard: N sessions, each the next, each with all its messages from the first on.
 sessions_are() {
@@ -84,10 +96,10 @@ watch_lines() {
   local number values=()
   for number in "$@"; do values+=("/run/rig/sim_gpio$number/value"); done
   chrt -f 90 /payload/line_times watch /run/changes.txt "${values[@]}" >/run/results/watching.txt 2>&1 &
-  watcher=$!
+  echo $! >/run/watcher
   eventually grep -q watching /run/results/watching.txt
 }
-watched() { kill -TERM "$watcher" && wait "$watcher"; }
+watched() { ends_at_term "$(</run/watcher)"; }
 shows() { [[ $(</run/rig/sim_gpio"$1"/value) == "$2" ]]; }
 pull() { echo "pull-$2" >/run/rig/sim_gpio"$1"/pull; }
 journal() { journalctl -u stereotrackd -o cat | tell; }

@@ -47,7 +47,7 @@ fact "the clock is set two hours back" set_clock -7200
 fact "pairs go on after that, too" rises stereotrack_frames_total 30
 fact "what is asked for is recorded" systemctl kill --signal=USR1 stereotrackd
 fact "at once" eventually is 'stereotrack_recordings_total{fate="written"}' 1
-fact "all left on time" is stereotrack_deadline_misses_total 0
+fact "all left, with their own results" all_left
 fact "no step of the capture clock was seen" is stereotrack_clock_steps_total 0
 fact "it is the process that was started" test "$(property MainPID)" = "$process"
 fact "and was not restarted" restarted 0
@@ -58,5 +58,5 @@ fact "it is one session, without a gap" sessions_are 1
 fact "what telemetry says of TAI followed the clock" followed
 fact "the recording replays" sh -c "stereotrack replay $recordings/*.strec --out /run/replayed"
 fact "the service ends" end
-journal
+journalctl -u stereotrackd -o short-monotonic | tell
 finish
