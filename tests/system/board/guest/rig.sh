@@ -1,6 +1,6 @@
 # shellcheck shell=bash
 # The whole rig under test, for cases: the packages installed, the service run by its own unit, by
-# /etc/stereotrack/stereotrackd.toml. Wants packages/stereotrack. What is to outlive a power cut lies on the data disk.
+# /etc/stereotrack/stereotrackd.toml. Wants packages/stereotrack and, for the tool, packages/stereotrack-tools.
 # shellcheck source=tests/system/board/guest/daemon.sh
 source /payload/.board/daemon.sh
 figures=/run/stereotrack/figures.prom
@@ -9,38 +9,19 @@ state=/var/lib/stereotrack
 # shellcheck disable=SC2034  # for cases
 recordings=$state/recordings
 
-# [DIRECTORY]: what the service keeps is on the data disk, which has a journal.
-use_data_disk() { mkdir -p $state && mount /dev/vdc $state; }
+# What the service keeps is on the data disk, which has a journal.
+use_data_disk() { mkdir -p $state && echo "/dev/vdc $state ext4 defaults 0 0" >>/etc/fstab && mount $state; }
 
 # The root disk has no journal: what apt wrote is flushed.
 install_rig() {
-  install -m 755 /payload/stereotrackd /payload/stereotrack /usr/bin/
-  mkdir -p /etc/stereotrack $state
-  cat >/etc/systemd/system/stereotrackd.service <<END
-[Service]
-Type=notify
-NotifyAccess=main
-ExecStart=/usr/bin/stereotrackd --config $configuration
-ExecReload=/bin/kill -HUP \$MAINPID
-ExecStopPost=/usr/bin/stereotrackd --config $configuration --safe-lines
-Restart=always
-RestartSec=0.5
-RestartPreventExitStatus=2
-WatchdogSec=10
-StateDirectory=stereotrack
-RuntimeDirectory=stereotrack
-LimitRTPRIO=99
-LimitMEMLOCK=infinity
-END
-  systemctl daemon-reload
-  sync
+  DEBIAN_FRONTEND=noninteractive apt-get install -q -y /payload/*.deb && sync
 }
 
-# Standard input: the configuration, without what it always has here.
+# Standard input: the configuration, without what it always has here: no right is missing.
 configure() {
   {
     cat
-    printf '[metrics]\nfile = "%s"\n' "$figures"
+    printf '[realtime]\nmode = "enforce"\n[metrics]\nfile = "%s"\n' "$figures"
   } >"$configuration"
 }
 # The scene of synthetic:eleven as `pairs` pairs for the loopback cameras, with its calibration. PAIRS SIZE

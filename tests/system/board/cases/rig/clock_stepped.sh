@@ -1,7 +1,7 @@
 #!/bin/bash
 # The clock of the day is set an hour forward, then back by two: outputs leave as if nothing had been, since nothing in
 # them is counted by it; what telemetry says of TAI follows.
-# wants: bin/stereotrackd bin/stereotrack tests/keep_telemetry
+# wants: packages/stereotrack packages/stereotrack-tools tests/keep_telemetry
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh

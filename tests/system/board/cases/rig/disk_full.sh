@@ -1,7 +1,7 @@
 #!/bin/bash
 # The disk of recordings is full: that is told once, tracking goes on, and recordings when there is room again; the next
 # time that it is full is told anew.
-# wants: bin/stereotrackd bin/stereotrack tests/keep_telemetry
+# wants: packages/stereotrack packages/stereotrack-tools tests/keep_telemetry
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh

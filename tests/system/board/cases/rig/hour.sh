@@ -1,6 +1,6 @@
 #!/bin/bash
 # An hour of the board's clock at two pairs a second: what the service holds after five minutes it holds after sixty.
-# wants: bin/stereotrackd bin/stereotrack
+# wants: packages/stereotrack packages/stereotrack-tools
 # limit: 4000
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh

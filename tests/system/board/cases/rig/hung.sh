@@ -1,7 +1,7 @@
 #!/bin/bash
 # A frame loop that hangs, and a process that does: the watchdog ends them, the lines are safe before, and the next process
 # tracks. The loop is held by its tracer, so that all other threads go on.
-# wants: bin/stereotrackd bin/stereotrack tests/hold_thread
+# wants: packages/stereotrack packages/stereotrack-tools tests/hold_thread
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh

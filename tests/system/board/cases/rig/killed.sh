@@ -1,7 +1,7 @@
 #!/bin/bash
 # kill -9: the service is restarted, receivers can tell, and the lines are safe: how soon is measured at lines whose pull
 # is to the unsafe side, the worst that a chip can do when nobody holds them.
-# wants: bin/stereotrackd bin/stereotrack tests/keep_telemetry tests/line_times
+# wants: packages/stereotrack packages/stereotrack-tools tests/keep_telemetry tests/line_times
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh

@@ -2,7 +2,7 @@
 # The installed service watches a scene that two loopback cameras play, ten pairs a second of 320x240: nothing is shed or
 # late, its datagrams are those of a replay of its own recording, and its lines rise and fall with the targets, at t + L.
 # Why that can be exact: cases/daemon/eleven.sh.
-# wants: bin/stereotrackd bin/stereotrack tests/play_loopback tests/keep_telemetry tests/line_times
+# wants: packages/stereotrack packages/stereotrack-tools tests/play_loopback tests/keep_telemetry tests/line_times
 # limit: 2000
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh

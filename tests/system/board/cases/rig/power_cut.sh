@@ -2,7 +2,7 @@
 # Power is cut, twice: as soon as a recording counts as written, and while another is being written. What counted as
 # written is whole, the other one is there up to its last whole frame, and the service comes up by itself each time.
 # What it keeps lies on a disk with a journal; what the board had not flushed is lost.
-# wants: bin/stereotrackd bin/stereotrack
+# wants: packages/stereotrack packages/stereotrack-tools
 # limit: 300
 # power cuts: 2
 # shellcheck source=tests/system/board/guest/tap.sh

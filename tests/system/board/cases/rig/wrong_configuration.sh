@@ -1,7 +1,7 @@
 #!/bin/bash
 # A wrong configuration: taken over while it runs it is refused, with its line in the journal, and the old one goes on;
 # at a start it is the reason, said once, and the service waits for a better one.
-# wants: bin/stereotrackd bin/stereotrack
+# wants: packages/stereotrack packages/stereotrack-tools
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
