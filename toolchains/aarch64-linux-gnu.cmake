@@ -2,7 +2,7 @@
 #     toolchains/fetch_arm64.sh build/arm64 && cmake --preset aarch64
 #         what needs no OpenCV. The compiler brings the C and C++ libraries, ours lie unpacked in STEREOTRACK_ARM64_ROOT;
 #         programs and tests run in qemu-aarch64.
-#     toolchains/make_sysroot.sh build/board/sysroot && cmake --preset aarch64-board
+#     toolchains/make_sysroot.sh bookworm-arm64 && cmake --preset aarch64-board
 #         everything. STEREOTRACK_SYSROOT is a whole arm64 Debian; programs run there, on a board: tests/system/board.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)

@@ -7,8 +7,8 @@
 #
 #     toolchains/fetch_arm64.sh FOLDER
 set -euo pipefail
-# shellcheck source=toolchains/arm64_packages.sh
-source "$(dirname "${BASH_SOURCE[0]}")/arm64_packages.sh"
+# shellcheck source=toolchains/debian_packages.sh
+source "$(dirname "${BASH_SOURCE[0]}")/debian_packages.sh"
 
 packages=(libhwy1 libhwy-dev libgtest-dev libgmock-dev libeigen3-dev libexpected-dev libcli11-dev libtomlplusplus-dev
   libnanopb-dev libsodium23 libsodium-dev)
@@ -25,12 +25,12 @@ if [[ -f $folder/stamp && $(<"$folder/stamp") == "$stamp" ]]; then exit 0; fi
 rm -rf "$folder/root" "$folder/stamp" "$folder/download"
 
 echo "arm64: asking the mirrors"
-arm64_open "$folder/apt"
+debian_open "$folder/apt" own arm64
 echo "arm64: fetching ${packages[*]}, and the source of qemu $version for one header"
-arm64_download "$folder/download" "${packages[@]}"
-arm64_unpack "$folder/root" "$folder/download"/*.deb
-arm64_source "$folder/download" "qemu=$version"
+debian_download "$folder/download" "${packages[@]}"
+debian_unpack "$folder/root" "$folder/download"/*.deb
+debian_source "$folder/download" "qemu=$version"
 tar -xf "$folder/download"/qemu_*.orig.tar.* --wildcards -O '*/include/qemu/qemu-plugin.h' >"$folder/qemu-plugin.h"
-arm64_close
+debian_close
 rm -rf "$folder/download"
 echo "$stamp" >"$folder/stamp"

@@ -8,10 +8,8 @@
 #     toolchains/fetch_gpiod2.sh FOLDER
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-# shellcheck source=toolchains/arm64_packages.sh
-source "$here/arm64_packages.sh"
-
-suite=trixie
+# shellcheck source=toolchains/debian_packages.sh
+source "$here/debian_packages.sh"
 
 (($# == 1)) || {
   echo "usage: fetch_gpiod2.sh FOLDER" >&2
@@ -22,19 +20,15 @@ folder=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
 # One maker at a time: worktrees may share the folder.
 exec 9>"$folder.lock"
 flock 9
-stamp=$(cat "$here/arm64_packages.sh" "$here/fetch_gpiod2.sh" | sha256sum | cut -d ' ' -f 1)
+stamp=$(cat "$here/debian_packages.sh" "$here/fetch_gpiod2.sh" | sha256sum | cut -d ' ' -f 1)
 if [[ -f $folder/stamp && $(<"$folder/stamp") == "$stamp" ]]; then exit 0; fi
 rm -rf "$folder" "$folder.work"
 
-echo "libgpiod 2: asking the mirrors for $suite"
-arm64_open "$folder.work/apt"
-# The machine's own suite, with what stands behind it (-updates, -security), is another Debian's now.
-own=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release)
-find "$folder.work/apt/etc" -type f -exec sed -i "s/\\b$own\\b/$suite/g" {} +
-apt-get update -q >>"$folder.work/apt/log" 2>&1 || true
-arm64_download "$folder.work/debs" "libgpiod3/$suite" "libgpiod-dev/$suite"
-arm64_close
-arm64_unpack "$folder.work/tree" "$folder.work"/debs/*.deb
+echo "libgpiod 2: asking the mirrors for trixie"
+debian_open "$folder.work/apt" trixie arm64
+debian_download "$folder.work/debs" libgpiod3 libgpiod-dev
+debian_close
+debian_unpack "$folder.work/tree" "$folder.work"/debs/*.deb
 mkdir -p "$folder/include" "$folder/lib"
 cp "$folder.work/tree/usr/include/gpiod.h" "$folder/include/"
 cp -L "$folder.work/tree/usr/lib/aarch64-linux-gnu/libgpiod.so.3" "$folder/lib/"

@@ -1,38 +1,90 @@
 #!/usr/bin/env bash
-# All libraries and headers of a cross build of every program for 64-bit ARM, taken from this machine's own Debian mirrors
-# and only unpacked: FOLDER is a sysroot. What is there is kept; remove FOLDER to fetch again. For the part that needs no
-# OpenCV fetch_arm64.sh is enough, and much smaller.
+# A sysroot: all libraries and headers that our programs and tests are built with, of a Debian for another architecture,
+# from this machine's own mirrors and only unpacked. What is there is kept; remove FOLDER to have newer packages.
 #
-#     toolchains/make_sysroot.sh FOLDER
-#     cmake --preset aarch64-board -DSTEREOTRACK_SYSROOT=FOLDER
+#     toolchains/make_sysroot.sh NAME [FOLDER]
+#         NAME      bookworm-arm64 (Debian 12), bookworm-armhf, trixie-arm64 (Debian 13), trixie-armhf
+#         FOLDER    build/sysroots/NAME if not told, or $STEREOTRACK_BOARD_CACHE/sysroots/NAME
+#     toolchains/make_sysroot.sh --where NAME      says that folder, and makes nothing
+#
+# Its var/lib/dpkg tells which package each file is of and what who needs a library depends on, as dpkg knows it of a
+# machine: dpkg-query --admindir=FOLDER/var/lib/dpkg -S FILE, info/PACKAGE:ARCHITECTURE.{shlibs,symbols}.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-# shellcheck source=toolchains/arm64_packages.sh
-source "$here/arm64_packages.sh"
+# shellcheck source=toolchains/debian_packages.sh
+source "$here/debian_packages.sh"
 
-packages=(libc6-dev libstdc++-12-dev libopencv-dev libeigen3-dev libexpected-dev libhwy-dev libtomlplusplus-dev
+usage() {
+  echo "usage: make_sysroot.sh [--where] {bookworm,trixie}-{arm64,armhf} [FOLDER]" >&2
+  exit 2
+}
+only_where=0
+if [[ ${1:-} == --where ]]; then
+  only_where=1
+  shift
+fi
+name=${1:-}
+case $name in
+  bookworm-*) release=bookworm gcc=12 ;;
+  trixie-*) release=trixie gcc=14 ;;
+  *) usage ;;
+esac
+case $name in
+  *-arm64) architecture=arm64 triplet=aarch64-linux-gnu ;;
+  *-armhf) architecture=armhf triplet=arm-linux-gnueabihf ;;
+  *) usage ;;
+esac
+case $# in
+  1) folder=${STEREOTRACK_BOARD_CACHE:-$here/../build}/sysroots/$name ;;
+  2) folder=$2 ;;
+  *) usage ;;
+esac
+folder=$(realpath -m "$folder")
+if ((only_where)); then
+  echo "$folder"
+  exit
+fi
+
+packages=(libc6-dev "libstdc++-$gcc-dev" libopencv-dev libeigen3-dev libexpected-dev libhwy-dev libtomlplusplus-dev
   libcli11-dev nlohmann-json3-dev libyaml-cpp-dev libsodium-dev libsystemd-dev libcpp-httplib-dev libgpiod-dev
   libnanopb-dev libcamera-dev libgtest-dev libgmock-dev)
 
-(($# == 1)) || {
-  echo "usage: make_sysroot.sh FOLDER" >&2
-  exit 2
-}
-mkdir -p "$(dirname "$1")"
-folder=$(cd "$(dirname "$1")" && pwd)/$(basename "$1")
+mkdir -p "$(dirname "$folder")"
 # One maker at a time: worktrees may share the folder.
 exec 9>"$folder.lock"
 flock 9
-stamp=$(echo "${packages[*]}" | cat - "$here/arm64_packages.sh" "$here/make_sysroot.sh" | sha256sum | cut -d ' ' -f 1)
+stamp=$(echo "$name" | cat - "$here/debian_packages.sh" "$here/make_sysroot.sh" | sha256sum | cut -d ' ' -f 1)
 if [[ -f $folder/stamp && $(<"$folder/stamp") == "$stamp" ]]; then exit 0; fi
 rm -rf "$folder" "$folder.work"
 
-echo "sysroot: fetching OpenCV, all that it wants, and our other libraries for arm64"
-arm64_open "$folder.work/apt"
-arm64_download_all "$folder.work/debs" "${packages[@]}"
-arm64_close
+echo "sysroot: fetching OpenCV, all that it wants, and our other libraries: $name"
+debian_open "$folder.work/apt" "$release" "$architecture"
+debian_download_all "$folder.work/debs" "${packages[@]}"
+debian_close
 echo "sysroot: unpacking $(find "$folder.work/debs" -name '*.deb' | wc -l) packages"
-arm64_unpack "$folder" "$folder.work"/debs/*.deb
+debian_unpack "$folder" "$folder.work"/debs/*.deb
+
+# What dpkg would have written, had it installed them.
+dpkg=$folder/var/lib/dpkg
+mkdir -p "$dpkg/info"
+echo 1 >"$dpkg/info/format"
+echo "$architecture" >"$dpkg/arch"
+: >"$dpkg/status"
+for deb in "$folder.work"/debs/*.deb; do
+  control=$folder.work/control
+  rm -rf "$control"
+  dpkg-deb --control "$deb" "$control"
+  package=$(sed -n 's/^Package: //p' "$control/control")
+  if grep -qx 'Multi-Arch: same' "$control/control"; then package+=:$architecture; fi
+  {
+    sed -e 's/^Package: .*/&\nStatus: install ok installed/' "$control/control"
+    echo
+  } >>"$dpkg/status"
+  for what in shlibs symbols; do
+    if [[ -f $control/$what ]]; then cp "$control/$what" "$dpkg/info/$package.$what"; fi
+  done
+  dpkg-deb --fsys-tarfile "$deb" | tar -t | sed -e 's|^\./|/|' -e 's|/$||' -e 's|^$|/.|' >"$dpkg/info/$package.list"
+done
 # Programs of theirs do not run here.
 rm -rf "$folder.work" "${folder:?}"/usr/{bin,sbin,share/{fonts,icons,perl,vim}}
 
@@ -41,8 +93,8 @@ find "$folder" -type l -lname '/*' -printf '%P\t%l\n' | while IFS=$'\t' read -r 
   ln -sfn "$(realpath -m --relative-to="$folder/$(dirname "$link")" "$folder$target")" "$folder/$link"
 done
 # Of update-alternatives, which unpacking does not run.
-for name in blas lapack; do
-  ln -sfn "$name/lib$name.so.3" "$folder/usr/lib/aarch64-linux-gnu/lib$name.so.3"
+for library in blas lapack; do
+  ln -sfn "$library/lib$library.so.3" "$folder/usr/lib/$triplet/lib$library.so.3"
 done
 echo "$stamp" >"$folder/stamp"
 echo "sysroot: $(du -s -m "$folder" | cut -f 1) MB"

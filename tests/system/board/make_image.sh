@@ -4,14 +4,14 @@
 #     FOLDER/initrd.gz   loads the modules of the disk and goes on with it
 #     FOLDER/root.ext4   Debian with systemd, udev, v4l-utils, gpiod, libcamera, our programs' libraries, modules
 #     FOLDER/id          changes with each of them
-# Packages come from this machine's mirrors (toolchains/arm64_packages.sh). Each part carries a stamp of what it is made
+# Packages come from this machine's mirrors (toolchains/debian_packages.sh). Each part carries a stamp of what it is made
 # of; what is there and fits is kept. Remove FOLDER to have newer packages.
 #
 #     tests/system/board/make_image.sh FOLDER
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-# shellcheck source=toolchains/arm64_packages.sh
-source "$here/../../../toolchains/arm64_packages.sh"
+# shellcheck source=toolchains/debian_packages.sh
+source "$here/../../../toolchains/debian_packages.sh"
 
 packages=(base-files base-passwd bash dash coreutils util-linux mount sed grep gawk findutils tar gzip login libc-bin
   init-system-helpers libpam-modules libpam-runtime systemd systemd-sysv udev kmod dbus procps iproute2 strace
@@ -41,7 +41,7 @@ exec 9>"$folder/lock"
 flock 9
 
 kernel_stamp=$(cat "$here/make_kernel.sh" "$here"/modules/* | hash_of)
-tree_stamp=$(echo "${packages[*]}" | cat - "$here/../../../toolchains/arm64_packages.sh" | hash_of)
+tree_stamp=$(echo "${packages[*]}" | cat - "$here/../../../toolchains/debian_packages.sh" | hash_of)
 image_stamp=$(echo "$kernel_stamp $tree_stamp" | cat - "$here/make_image.sh" "$here"/guest/{agent,devices,board-agent.service} | hash_of)
 
 if ! is_made kernel "$kernel_stamp"; then
@@ -53,11 +53,11 @@ fi
 if ! is_made tree "$tree_stamp"; then
   rm -rf "$folder/tree.stamp" "$folder/tree" "$work"
   say "fetching Debian for the board"
-  arm64_open "$work/apt"
-  arm64_download_all "$work/debs" "${packages[@]}"
-  arm64_close
+  debian_open "$work/apt" own arm64
+  debian_download_all "$work/debs" "${packages[@]}"
+  debian_close
   say "unpacking $(find "$work/debs" -name '*.deb' | wc -l) packages"
-  arm64_unpack "$folder/tree" "$work"/debs/*.deb
+  debian_unpack "$folder/tree" "$work"/debs/*.deb
   rm -rf "$work"
   echo "$tree_stamp" >"$folder/tree.stamp"
 fi

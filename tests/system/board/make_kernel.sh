@@ -7,8 +7,8 @@
 #     tests/system/board/make_kernel.sh FOLDER      (make_image.sh calls it)
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-# shellcheck source=toolchains/arm64_packages.sh
-source "$here/../../../toolchains/arm64_packages.sh"
+# shellcheck source=toolchains/debian_packages.sh
+source "$here/../../../toolchains/debian_packages.sh"
 
 series=6.1
 cross=aarch64-linux-gnu-
@@ -26,7 +26,7 @@ say() { echo "board: $*"; }
 
 say "asking the mirrors for a kernel"
 machine=$(dpkg --print-architecture)
-arm64_open "$work/apt" "$machine"
+debian_open "$work/apt" own arm64 "$machine"
 release=$(apt-cache depends linux-image-arm64 | sed -n 's/^ *Depends: linux-image-//p')
 [[ $release == "$series".* ]] || {
   echo "make_kernel.sh: the mirrors' kernel for arm64 is '$release', this script builds modules for $series (Debian 12)" >&2
@@ -34,10 +34,10 @@ release=$(apt-cache depends linux-image-arm64 | sed -n 's/^ *Depends: linux-imag
 }
 say "fetching Linux $release and its source"
 # What the headers' build calls runs on this machine: kbuild is of its architecture.
-arm64_download "$work/debs" "linux-image-$release" "linux-headers-$release" "linux-headers-${release%-arm64}-common" \
+debian_download "$work/debs" "linux-image-$release" "linux-headers-$release" "linux-headers-${release%-arm64}-common" \
   "linux-kbuild-$series:$machine" "linux-source-$series" v4l2loopback-dkms busybox-static
-arm64_close
-arm64_unpack "$work/tree" "$work"/debs/{linux-image,linux-headers,linux-kbuild,v4l2loopback-dkms,busybox-static}*.deb
+debian_close
+debian_unpack "$work/tree" "$work"/debs/{linux-image,linux-headers,linux-kbuild,v4l2loopback-dkms,busybox-static}*.deb
 cp "$work/tree/boot/vmlinuz-$release" "$folder/vmlinuz"
 cp "$work/tree/usr/bin/busybox" "$folder/busybox"
 mkdir -p "$folder/tree/lib"
