@@ -2,8 +2,8 @@
 """Instructions of `stereotrack_pure work` on 64-bit ARM, counted by a plugin of qemu-aarch64, and what they mean for two
 ARM cores.
 
-    count_aarch64.py --native PROGRAM --emulated PROGRAM --plugin libqemu_count.so [--callgrind] [--warm-up N]
-                     [--frames N] [--json FILE]
+    count_aarch64.py --native PROGRAM --emulated PROGRAM --sysroot FOLDER --plugin libqemu_count.so [--callgrind]
+                     [--warm-up N] [--frames N] [--json FILE]
 
 Counts are exact and the same twice. Pairs are drawn by the native program. --callgrind counts it, too, on AVX2 at best.
 
@@ -24,7 +24,6 @@ import subprocess
 import sys
 import tempfile
 
-EMULATOR = ["qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"]
 LIMITS = {"sad_dense": 30e6}
 CORES = {"A72": {"ghz": 1.8, "width": 3, "simd": 2, "memory": 2}, "A76": {"ghz": 2.4, "width": 4, "simd": 2, "memory": 2}}
 
@@ -53,7 +52,7 @@ def count_emulated(args):
     """{name: (calls, instructions, simd, memory)}, of all calls together."""
     with tempfile.TemporaryDirectory() as folder:
         counts = pathlib.Path(folder) / "counts"
-        out = run([*EMULATOR, "-plugin", f"{args.plugin},out={counts}", args.emulated], args.native, args)
+        out = run(["qemu-aarch64", "-L", args.sysroot, "-plugin", f"{args.plugin},out={counts}", args.emulated], args.native, args)
         names = names_of(out)
         rows = [list(map(int, line.split())) for line in counts.read_text().splitlines()]
     if sorted(row[0] for row in rows) != sorted(names):
@@ -85,6 +84,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--native", required=True, help="stereotrack_pure, built for this machine")
     parser.add_argument("--emulated", required=True, help="stereotrack_pure, built for 64-bit ARM")
+    parser.add_argument("--sysroot", required=True, help="the C library and all others of the emulated program")
     parser.add_argument("--plugin", required=True)
     parser.add_argument("--callgrind", action="store_true")
     parser.add_argument("--warm-up", type=int, default=32)

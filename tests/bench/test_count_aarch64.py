@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Counts on 64-bit ARM are the same twice, and hang together.
 
-    test_count_aarch64.py NATIVE_PROGRAM EMULATED_PROGRAM PLUGIN
+    test_count_aarch64.py NATIVE_PROGRAM EMULATED_PROGRAM SYSROOT PLUGIN
 """
 import json
 import pathlib
@@ -14,9 +14,9 @@ script = pathlib.Path(__file__).with_name("count_aarch64.py")
 
 def count(folder):
     file = pathlib.Path(folder) / "count.json"
-    native, emulated, plugin = sys.argv[1:4]
-    subprocess.run([sys.executable, script, "--native", native, "--emulated", emulated, "--plugin", plugin,
-                    "--warm-up", "2", "--frames", "1", "--json", file], check=True)
+    native, emulated, sysroot, plugin = sys.argv[1:5]
+    subprocess.run([sys.executable, script, "--native", native, "--emulated", emulated, "--sysroot", sysroot,
+                    "--plugin", plugin, "--warm-up", "2", "--frames", "1", "--json", file], check=True)
     return json.loads(file.read_text())
 
 

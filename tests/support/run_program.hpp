@@ -7,10 +7,12 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -43,11 +45,23 @@ struct ProgramResult {
   std::string err;
 };
 
+/// The words, a line each, of the emulator that programs of another CPU run in: tests/emulated. Empty: none.
+inline std::vector<std::string> emulator() {
+  std::vector<std::string> words;
+  if (const char* lines = std::getenv("STEREOTRACK_EMULATOR"); lines != nullptr) {
+    std::istringstream text(lines);
+    for (std::string word; std::getline(text, word);) words.push_back(word);
+  }
+  return words;
+}
+
 /// A program that runs beside the test. Its output goes to files, so it never waits for a reader.
 class Program {
  public:
   explicit Program(std::vector<std::string> command, ProgramOptions options = {})
       : options_(std::move(options)), start_(Clock::now()) {
+    const std::vector<std::string> before = emulator();
+    command.insert(command.begin(), before.begin(), before.end());
     std::vector<char*> arguments;
     arguments.reserve(command.size() + 1);
     for (std::string& word : command) arguments.push_back(word.data());

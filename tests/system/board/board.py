@@ -455,7 +455,7 @@ def main():
     several = argparse.ArgumentParser(add_help=False)
     several.add_argument("names", nargs="*", metavar="GROUP|GROUP/CASE")
     test = commands.add_parser("test", parents=[with_clock, several])
-    test.add_argument("--build", default=PROJECT / "build/aarch64-board", metavar="FOLDER")
+    test.add_argument("--build", default=PROJECT / "build/aarch64", metavar="FOLDER")
     test.add_argument("--jobs", type=int, default=0, metavar="N")
     test.add_argument("--junit", default=PROJECT / "build/board.xml", metavar="FILE")
     commands.add_parser("targets", parents=[several])
