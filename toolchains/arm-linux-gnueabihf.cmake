@@ -1,13 +1,15 @@
 # 32-bit ARM, as Debian's armhf: g++-arm-linux-gnueabihf or clang, and a sysroot (cross.cmake has the settings).
 #     toolchains/make_sysroot.sh bookworm-armhf && cmake --preset armhf
 #
-# NEON with fused multiply-add is asked for, which Debian does not: Highway cannot choose it at run time there. Cortex-A7, A15
-# and all 64-bit cores have it; A8 and A9 do not.
+# NEON with fused multiply-add is asked for, which Debian does not: Highway cannot choose it at run time there.
+# Cortex-A7, A15 and all 64-bit cores have it; A8 and A9 do not.
 set(stereotrack_triplet arm-linux-gnueabihf)
 set(stereotrack_architecture armhf)
 set(stereotrack_processor armv7l)
 set(stereotrack_emulator qemu-arm)
 set(stereotrack_flags "-march=armv7-a -mfpu=neon-vfpv4 -mfloat-abi=hard -mthumb")
+# Highway names the type, GCC has it only when told in which form.
+set(stereotrack_flags_of_gcc "-mfp16-format=ieee")
 # Seconds are as wide as in the libraries: libgpiod and cpp-httplib pass them. Debian 13 has made all 64 bits; before,
 # they are 32, which end in 2038.
 if(STEREOTRACK_DEBIAN STREQUAL trixie)

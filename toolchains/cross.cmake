@@ -4,14 +4,15 @@
 #     stereotrack_processor       CMake's and the kernel's: aarch64
 #     stereotrack_emulator        of one program, on this machine: qemu-aarch64
 #     stereotrack_flags           for every compilation
+#     stereotrack_flags_of_gcc    those that only GCC knows
 #
-# The sysroot is the target's libraries and headers. The compiler is this machine's; it must not know a newer C library than
-# the sysroot has.
+# The sysroot is the target's libraries and headers. The compiler is this machine's; it must not know a newer C library
+# than the sysroot has.
 set(STEREOTRACK_DEBIAN bookworm CACHE STRING "Debian whose sysroot is taken: bookworm (12), trixie (13)")
 set(STEREOTRACK_COMPILER gcc CACHE STRING "gcc, clang, or clang-VERSION")
-# Never what the results are: floating point is not contracted (the top CMakeLists.txt), and no kernel asks which core it is.
-# A core newer than the board's is an illegal instruction there.
-set(STEREOTRACK_CPU "" CACHE STRING "Core to build for: cortex-a53, cortex-a72, cortex-a76; empty: any of the architecture")
+# Never what the results are: floating point is not contracted (the top CMakeLists.txt), and no kernel asks which core
+# it is. A core newer than the board's is an illegal instruction there.
+set(STEREOTRACK_CPU "" CACHE STRING "Core to build for: cortex-a53, cortex-a72, cortex-a76; empty: any")
 if(NOT STEREOTRACK_SYSROOT)
   if(DEFINED ENV{STEREOTRACK_BOARD_CACHE})
     set(sysroot $ENV{STEREOTRACK_BOARD_CACHE})
@@ -27,7 +28,7 @@ get_filename_component(root "${STEREOTRACK_SYSROOT}" ABSOLUTE BASE_DIR ${CMAKE_S
 # As both Debian and what was copied from a board have it.
 set(libraries ${root}/usr/lib/${stereotrack_triplet})
 if(NOT EXISTS ${libraries})
-  message(FATAL_ERROR "${root} is no sysroot for ${stereotrack_triplet}: it lacks usr/lib/${stereotrack_triplet}. To make one: "
+  message(FATAL_ERROR "${root} is no sysroot: it lacks usr/lib/${stereotrack_triplet}. To make one: "
                       "toolchains/make_sysroot.sh ${STEREOTRACK_DEBIAN}-${stereotrack_architecture} (docs/CROSS.md)")
 endif()
 
@@ -47,7 +48,7 @@ if(STEREOTRACK_COMPILER STREQUAL gcc)
   set(CMAKE_C_COMPILER ${stereotrack_triplet}-gcc)
   set(CMAKE_CXX_COMPILER ${stereotrack_triplet}-g++)
   # Start files of the sysroot's C library, not of the compiler's own.
-  string(PREPEND stereotrack_flags "-B${libraries} ")
+  string(PREPEND stereotrack_flags "-B${libraries} ${stereotrack_flags_of_gcc} ")
 elseif(STEREOTRACK_COMPILER MATCHES "^clang(-[0-9]+)?$")
   set(CMAKE_C_COMPILER clang${CMAKE_MATCH_1})
   set(CMAKE_CXX_COMPILER clang++${CMAKE_MATCH_1})

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The header of plugins of the qemu-user that is installed here, out of its source: Debian packages none. What is there is
-# kept; remove FOLDER to fetch again.
+# The header of plugins of the qemu-user that is installed here, out of its source: Debian packages none. What is there
+# is kept; remove FOLDER to fetch again.
 #     FOLDER/qemu-plugin.h
 #
 #     toolchains/fetch_qemu_plugin.sh FOLDER

@@ -1,10 +1,10 @@
 # The compiler and sysroot of an SDK, whose environment is sourced first.
 #     Yocto:        source /opt/poky/5.0/environment-setup-cortexa72-poky-linux && cmake --preset sdk
 #     Buildroot:    source SDK/environment-setup && cmake --preset sdk
-# Buildroot's own toolchainfile.cmake does as well: cmake --preset sdk --toolchain SDK/share/buildroot/toolchainfile.cmake
+# Buildroot's own toolchainfile.cmake does as well: --toolchain SDK/share/buildroot/toolchainfile.cmake
 #
-# Read when a build folder is made, and kept there: CC, CXX, CFLAGS, CXXFLAGS, LDFLAGS, the PATH on which the compiler is, and
-# the sysroot: SDKTARGETSYSROOT or OECORE_TARGET_SYSROOT (Yocto), STAGING_DIR (Buildroot), or what the compiler says.
+# Read when a build folder is made, and kept there: CC, CXX, CFLAGS, CXXFLAGS, LDFLAGS, where the compiler is, and the
+# sysroot: SDKTARGETSYSROOT or OECORE_TARGET_SYSROOT (Yocto), STAGING_DIR (Buildroot), or what the compiler says.
 # The SDK's flags come before ours, which have the last word on floating point: results are the same as everywhere.
 foreach(name CC CXX CFLAGS CXXFLAGS LDFLAGS)
   set(STEREOTRACK_SDK_${name} "$ENV{${name}}" CACHE STRING "${name} of the SDK")
@@ -17,8 +17,8 @@ foreach(language C CXX)
   endif()
   separate_arguments(words UNIX_COMMAND "${STEREOTRACK_SDK_${name}}")
   if(NOT words)
-    message(FATAL_ERROR "toolchains/sdk.cmake: ${name} is not set: source the SDK's environment-setup file first, and remove "
-                        "a build folder that was made without (docs/CROSS.md)")
+    message(FATAL_ERROR "toolchains/sdk.cmake: ${name} is not set: source the SDK's environment-setup file first, and "
+                        "remove a build folder that was made without (docs/CROSS.md)")
   endif()
   list(POP_FRONT words program)
   set(compiler STEREOTRACK_SDK_PATH_OF_${name})
@@ -35,34 +35,31 @@ set(CMAKE_MODULE_LINKER_FLAGS_INIT "${STEREOTRACK_SDK_LDFLAGS}")
 separate_arguments(command UNIX_COMMAND "${STEREOTRACK_SDK_CXX}")
 list(POP_FRONT command)
 list(PREPEND command ${CMAKE_CXX_COMPILER})
-foreach(question machine sysroot multiarch)
-  set(asked -print-${question})
-  if(question STREQUAL machine)
-    set(asked -dumpmachine)
-  endif()
-  execute_process(COMMAND ${command} ${asked} OUTPUT_VARIABLE ${question} OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+foreach(question dumpmachine print-sysroot print-multiarch)
+  execute_process(COMMAND ${command} -${question}
+    OUTPUT_VARIABLE ${question} OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 endforeach()
 foreach(name SDKTARGETSYSROOT OECORE_TARGET_SYSROOT STAGING_DIR)
   if(NOT STEREOTRACK_SYSROOT AND DEFINED ENV{${name}})
     set(STEREOTRACK_SYSROOT $ENV{${name}} CACHE PATH "Sysroot of the SDK")
   endif()
 endforeach()
-set(STEREOTRACK_SYSROOT "${sysroot}" CACHE PATH "Sysroot of the SDK")
+set(STEREOTRACK_SYSROOT "${print-sysroot}" CACHE PATH "Sysroot of the SDK")
 list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES STEREOTRACK_SYSROOT)
 if(NOT IS_DIRECTORY "${STEREOTRACK_SYSROOT}/usr/include")
-  message(FATAL_ERROR "toolchains/sdk.cmake: ${STEREOTRACK_SYSROOT} is no sysroot: it lacks usr/include. Neither SDKTARGETSYSROOT, "
-                      "OECORE_TARGET_SYSROOT nor STAGING_DIR name one, and ${CMAKE_CXX_COMPILER} has none")
+  message(FATAL_ERROR "toolchains/sdk.cmake: '${STEREOTRACK_SYSROOT}' is no sysroot: it lacks usr/include. "
+                      "SDKTARGETSYSROOT, OECORE_TARGET_SYSROOT, STAGING_DIR and ${CMAKE_CXX_COMPILER} name no other")
 endif()
 
 set(CMAKE_SYSTEM_NAME Linux)
-string(REGEX REPLACE "-.*" "" CMAKE_SYSTEM_PROCESSOR "${machine}")
+string(REGEX REPLACE "-.*" "" CMAKE_SYSTEM_PROCESSOR "${dumpmachine}")
 set(CMAKE_SYSROOT ${STEREOTRACK_SYSROOT})
-if(multiarch)
-  set(CMAKE_LIBRARY_ARCHITECTURE ${multiarch})
+if(print-multiarch)
+  set(CMAKE_LIBRARY_ARCHITECTURE ${print-multiarch})
 endif()
 set(ENV{PKG_CONFIG_SYSROOT_DIR} ${CMAKE_SYSROOT})
 set(described "")
-foreach(folder lib/${multiarch} lib lib64 share)
+foreach(folder lib/${print-multiarch} lib lib64 share)
   list(APPEND described ${CMAKE_SYSROOT}/usr/${folder}/pkgconfig)
 endforeach()
 list(JOIN described ":" described)

@@ -7,8 +7,10 @@ set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${left_out})
 # Whole programs are not even built, except where the emulated board wants one.
 file(STRINGS ${left_out} stereotrack_programs_left_out REGEX "^program ")
 list(TRANSFORM stereotrack_programs_left_out REPLACE "^program ([^ ]+).*" "\\1")
+file(STRINGS ${left_out} stereotrack_rooms_left_out REGEX "^room ")
+list(TRANSFORM stereotrack_rooms_left_out REPLACE "^room ([^ ]+).*" "\\1")
 
-# One ctest entry for a program of GoogleTest, less what left_out.txt names. Emulated, it takes long: the limit is of a hang.
+# One ctest entry for a program of GoogleTest, less what left_out.txt names. The limit is for one that hangs.
 function(stereotrack_emulated_test NAME LABEL)
   if(${NAME} IN_LIST stereotrack_programs_left_out)
     set_target_properties(${NAME} PROPERTIES EXCLUDE_FROM_ALL ON)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Test programs for another CPU, in an emulator of one process.
 
-    emulated.py run --results FOLDER PROGRAM EMULATOR [ARGUMENT...]    all tests of a program but those that are left out
-    emulated.py report --results FOLDER [--part]                       counts what all programs ran; names what none ran
+    emulated.py run --results FOLDER PROGRAM EMULATOR [ARGUMENT...]    all tests of a program, less what is left out
+    emulated.py report --results FOLDER [--part]                       counts what all programs ran, and what none did
 
 Left out is what left_out.txt names, beside this file, and nothing else: a test that skips itself fails the report where
 ../expected_skips.txt does not name it, and so does a line of left_out.txt that leaves out nothing.
@@ -23,7 +23,7 @@ from report_tests import DATA, read_expected  # noqa: E402
 
 
 def read_left_out(path):
-    """[(pattern, why)] of tests, {program: why}."""
+    """[(pattern, why)] of tests, {what else: why}."""
     tests, programs = [], {}
     for number, line in enumerate(path.read_text().splitlines(), 1):
         if not line.strip() or line.startswith("#"):
@@ -31,8 +31,8 @@ def read_left_out(path):
         columns = [column.strip() for column in line.split(" | ")]
         if len(columns) != 2 or not all(columns):
             sys.exit(f"{path.name}:{number}: want NAME | why")
-        if columns[0].startswith("program "):
-            programs[columns[0].split()[1]] = columns[1]
+        if columns[0].startswith(("program ", "room ")):
+            programs[columns[0]] = columns[1]
         else:
             tests.append((columns[0], columns[1]))
     return tests, programs
@@ -103,8 +103,8 @@ def report(args):
                 skipped.append((name, case.find("skipped").get("message").splitlines()[-1]))
             else:
                 passed += 1
-    print(f"emulated: {passed} tests passed, {len(failed)} failed, {len(skipped)} skipped, {sum(left.values())} left out, "
-          f"and {len(programs)} programs")
+    print(f"emulated: {passed} tests passed, {len(failed)} failed, {len(skipped)} skipped, {sum(left.values())} left "
+          f"out, and {len(programs)} programs and rooms")
     for name in failed:
         print(f"  failed {name}")
     for name, reason in skipped:
@@ -118,7 +118,7 @@ def report(args):
         if left[pattern] == 0 and not args.part:
             errors.append(f"{args.left_out.name}: {pattern} leaves out nothing")
     for name, why in programs.items():
-        print(f"  left out program {name}: {why}")
+        print(f"  left out {name}: {why}")
     for seconds, name in sorted(slow, reverse=True)[: args.slowest]:
         print(f"  {seconds:6.1f} s {name}")
     if passed == 0:

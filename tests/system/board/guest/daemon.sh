@@ -3,8 +3,26 @@
 unit=stereotrackd
 figures=/run/results/figures.prom
 
-# LEFT RIGHT [MORE]: two cameras of vivid's, ten pairs a second, with the calibration of /run/scene; MORE is TOML.
+matrix() { printf '%s: !!opencv-matrix\n   rows: %d\n   cols: %d\n   dt: d\n   data: [ %s ]\n' "$@"; }
+
+# FILE WIDTH HEIGHT: of two cameras without distortion, a quarter of a metre apart.
+plain_calibration() {
+  local file=$1 width=$2 height=$3 side focal
+  focal=$((width * 15 / 16))
+  {
+    printf '%%YAML:1.0\n---\nimage_size: [ %d, %d ]\n' "$width" "$height"
+    for side in 1 2; do
+      matrix "K$side" 3 3 "$focal, 0, $((width / 2)), 0, $focal, $((height / 2)), 0, 0, 1"
+      matrix "D$side" 1 5 "0, 0, 0, 0, 0"
+    done
+    matrix R 3 3 "1, 0, 0, 0, 1, 0, 0, 0, 1"
+    matrix T 3 1 "-0.25, 0, 0"
+  } >"$file"
+}
+
+# LEFT RIGHT [MORE]: two cameras of vivid's, ten pairs a second, with a calibration; MORE is TOML.
 vivid_rig() {
+  plain_calibration /run/calibration.yml 320 180
   cat >/run/rig.toml <<END
 [source]
 name = "cameras"
@@ -20,7 +38,7 @@ timeout_ms = 1000
 # vivid stamps what it calls the end of a frame, nine tenths of a period after the frame has come.
 readout_us = 90000
 [calibration]
-file = "/run/scene/calibration.yml"
+file = "/run/calibration.yml"
 [latency]
 output_ms = 150.0
 [metrics]

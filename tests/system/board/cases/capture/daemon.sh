@@ -1,6 +1,6 @@
 #!/bin/bash
 # stereotrackd on two cameras of the kernel's: pairs from their own buffers, one lost, both unplugged, a fatal error.
-# wants: bin/stereotrackd bin/stereotrack
+# wants: bin/stereotrackd
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
@@ -15,8 +15,6 @@ plug_in() { echo vivid.0 >/sys/bus/platform/drivers/vivid/bind; }
 is_there() { [[ $(figure "stereotrack_camera_silent{camera=\"$1\"}") == 0 ]]; }
 paired='stereotrack_pairing_total{verdict="paired"}'
 
-fact "a scene of that size brings a calibration" \
-  /payload/stereotrack synth eleven --out /run/scene --frames 1 --size 320x180
 fact "both cameras can do what is asked of them" check
 fact "it starts on both" start
 fact "pairs come" eventually over "$paired" 5

@@ -1,7 +1,7 @@
 #!/bin/bash
 # stereotrackd and the errors that vivid has on demand, one after the other on one run: what each leads to, that each is
 # counted where it belongs, and that pairs come again. Then runs that begin amid trouble.
-# wants: bin/stereotrackd bin/stereotrack
+# wants: bin/stereotrackd
 # limit: 900
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
@@ -13,8 +13,6 @@ of() { echo "stereotrack_camera_$1{camera=\"$2\"${3:+,fate=\"$3\"}}"; }
 paired='stereotrack_pairing_total{verdict="paired"}'
 missing_left='stereotrack_pairing_total{verdict="missing_left"}'
 missing_right='stereotrack_pairing_total{verdict="missing_right"}'
-
-/payload/stereotrack synth eleven --out /run/scene --frames 1 --size 320x180 >/dev/null 2>&1
 
 # ---- Cameras that are not there when the daemon starts: none, then the left one, then the right one.
 unit=none

@@ -29,24 +29,7 @@ output_ms = 150.0
 file = "/run/results/figures.prom"
 END
 
-matrix() { printf '%s: !!opencv-matrix\n   rows: %d\n   cols: %d\n   dt: d\n   data: [ %s ]\n' "$@"; }
-{
-  printf '%%YAML:1.0\n---\nimage_size: [ 318, 180 ]\n'
-  for side in 1 2; do
-    matrix "K$side" 3 3 "298.125, 0, 158.5, 0, 298.125, 89.5, 0, 0, 1"
-    matrix "D$side" 1 5 "0, 0, 0, 0, 0"
-  done
-  matrix R 3 3 "1, 0, 0, 0, 1, 0, 0, 0, 1"
-  matrix T 3 1 "-0.25, 0, 0"
-} >/run/calibration.yml
-
-# Without a module: the line says why, and how to go on.
-refuses_without_a_module() {
-  local said
-  said=$(STEREOTRACK_MODULE_PATH=/nowhere check 2>&1) && return 1
-  echo "$said"
-  grep 'libcamera: there is no module, .*/nowhere' <<<"$said"
-}
+plain_calibration /run/calibration.yml 318 180
 # Nor does a module that does not load hinder cameras of the kernel's.
 v4l2_starts_without() {
   mkdir -p /run/modules

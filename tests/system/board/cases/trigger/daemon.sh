@@ -1,7 +1,7 @@
 #!/bin/bash
 # The trigger on real lines: pulses of ours read back at the pin, edges of somebody else's, what is not there. The
 # kernel's cameras run free, so whether their frames answer a pulse is chance: what is asserted holds either way.
-# wants: bin/stereotrackd bin/stereotrack
+# wants: bin/stereotrackd
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
@@ -61,8 +61,6 @@ all_are_told() {
 }
 is_silent() { [[ $(figure stereotrack_trigger_silent) == 1 ]]; }
 
-fact "a scene of that size brings a calibration" \
-  /payload/stereotrack synth eleven --out /run/scene --frames 1 --size 320x180
 
 configure 'mode = "gpio"
 line = "rig:TRIGGER"
