@@ -424,8 +424,13 @@ def wanted(build, want):
     found = sorted(build.glob(f"{want}_*.deb"))
     if len(found) != 1:
         said = ", ".join(path.name for path in found) or "none"
-        raise UsageError(f"want one package {build / want}_*.deb, there is: {said}; make it: ./dev package")
+        raise UsageError(f"want one package {build / want}_*.deb, there is: {said}; make it: cmake --build {build} --target packages")
     return found[0]
+
+
+def target_of(want):
+    """The CMake target that makes it."""
+    return "packages" if want.startswith("packages/") else pathlib.Path(want).name
 
 
 def run_case(case, args, results):
@@ -492,7 +497,7 @@ def command_test(args):
 
 
 def command_targets(args):
-    print(*sorted({pathlib.Path(want).name for case in cases_of(args.names) for want in case.wants}))
+    print(*sorted({target_of(want) for case in cases_of(args.names) for want in case.wants}))
     return 0
 
 

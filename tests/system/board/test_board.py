@@ -112,6 +112,10 @@ class Facts(unittest.TestCase):
 
 
 class Wanted(unittest.TestCase):
+    def test_a_package_is_made_by_the_target_of_all(self):
+        self.assertEqual(board.target_of("packages/stereotrack-tools"), "packages")
+        self.assertEqual(board.target_of("tests/gpio_board_test"), "gpio_board_test")
+
     def test_a_package_is_the_one_deb_of_that_name(self):
         with tempfile.TemporaryDirectory() as name:
             build = pathlib.Path(name)

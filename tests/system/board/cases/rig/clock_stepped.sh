@@ -12,9 +12,9 @@ fact "the packages are installed" install_rig
 configure <<END
 [source]
 name = "synthetic:eleven"
-fps = 10.0
+fps = 5.0
 [synthetic]
-frames = 90
+frames = 30
 width = 160
 height = 120
 [latency]
@@ -42,9 +42,9 @@ fact "the service is ready" begin
 process=$(property MainPID)
 fact "it runs" runs 20
 fact "the clock is set an hour forward" set_clock 3600
-fact "pairs go on" rises stereotrack_frames_total 30
+fact "pairs go on" rises stereotrack_frames_total 15
 fact "the clock is set two hours back" set_clock -7200
-fact "pairs go on after that, too" rises stereotrack_frames_total 30
+fact "pairs go on after that, too" rises stereotrack_frames_total 15
 fact "what is asked for is recorded" systemctl kill --signal=USR1 stereotrackd
 fact "at once" eventually is 'stereotrack_recordings_total{fate="written"}' 1
 fact "all left, with their own results" all_left

@@ -12,9 +12,9 @@ fact "the packages are installed" install_rig
 configure <<END
 [source]
 name = "synthetic:eleven"
-fps = 10.0
+fps = 5.0
 [synthetic]
-frames = 90
+frames = 30
 width = 160
 height = 120
 [latency]
@@ -45,7 +45,7 @@ told_times() {
 fact "recordings have a small disk of their own" small_disk
 fact "somebody listens" listen
 fact "the service is ready" begin
-fact "it runs" runs 25
+fact "it runs" runs 12
 fact "it is asked to record" ask
 fact "and does" eventually is "$written" 1
 fact "the disk is filled" fill
@@ -55,7 +55,7 @@ fact "and tells of it, and of the way out" eventually told_times 1
 fact "asked once more" ask
 fact "it cannot, again" eventually is "$failed" 2
 fact "which it tells no second time" told_times 1
-fact "tracking goes on" rises stereotrack_frames_total 20
+fact "tracking goes on" rises stereotrack_frames_total 10
 fact "and all left, with their own results" all_left
 fact "nothing half done is left" sh -c "[ -z \"\$(ls $recordings | grep part)\" ]"
 fact "there is room again" rm $recordings/filler

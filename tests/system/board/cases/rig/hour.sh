@@ -13,7 +13,7 @@ configure <<END
 name = "synthetic:eleven"
 fps = 2.0
 [synthetic]
-frames = 90
+frames = 30
 width = 160
 height = 120
 [latency]

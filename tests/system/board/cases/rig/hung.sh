@@ -12,9 +12,9 @@ fact "the packages are installed" install_rig
 configure <<END
 [source]
 name = "synthetic:eleven"
-fps = 10.0
+fps = 5.0
 [synthetic]
-frames = 90
+frames = 30
 width = 160
 height = 120
 [latency]

@@ -12,9 +12,9 @@ fact "the packages are installed" install_rig
 configure <<END
 [source]
 name = "synthetic:eleven"
-fps = 10.0
+fps = 5.0
 [synthetic]
-frames = 90
+frames = 30
 width = 160
 height = 120
 [latency]
@@ -38,7 +38,7 @@ process=$(property MainPID)
 fact "a target makes its line active" eventually shows 2 1
 cp /run/wrong.toml "$configuration"
 fact "a wrong configuration is to be taken over" systemctl reload stereotrackd
-fact "it is refused, with file and line" eventually says "reload: refused, .*stereotrackd.toml:$wrong_line: .*confirmd"
+fact "it is refused, with file and line" eventually says "reload: refused, .*stereotrackd.toml:$wrong_line:[0-9]+: .*confirmd"
 fact "and counted" eventually is stereotrack_reloads_refused_total 1
 fact "the old one goes on" rises stereotrack_frames_total 10
 fact "all leave with their own results" all_left
@@ -46,7 +46,7 @@ fact "its line, too" eventually shows 2 1
 fact "it is the process that was started" test "$(property MainPID)" = "$process"
 
 fact "it is restarted with it, in vain" sh -c '! systemctl restart stereotrackd'
-fact "which is told, with file and line" eventually says "^[^r].*stereotrackd.toml:$wrong_line: .*confirmd"
+fact "which is told, with file and line" eventually says "^/etc/.*stereotrackd.toml:$wrong_line:[0-9]+: .*confirmd"
 sleep 5
 fact "it is not tried again and again" test "$(property ActiveState)" = failed
 fact "the line is safe" shows 2 0
