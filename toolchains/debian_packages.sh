@@ -8,6 +8,7 @@
 #     debian_download_all FOLDER PACKAGE...         and all they depend on, as on a machine that has nothing yet
 #     debian_source FOLDER PACKAGE                  the source of a package, not unpacked
 #     debian_unpack FOLDER DEB...                   packages into the tree FOLDER; /bin, /sbin, /lib are links into /usr
+#     debian_install FOLDER DEB...                  the same, and dpkg there knows them as installed; no script of theirs runs
 #     debian_close                                  removes apt's folder
 
 debian_apt=
@@ -77,18 +78,89 @@ debian_download_all() {
 
 debian_source() { debian_fetch "$1" "the source of $2" apt-get source -q --download-only --only-source "$2"; }
 
-# Documents and translations are of no use to a build nor to a board.
-debian_unpack() {
-  local tree=$1 name deb
-  shift
+# The folders of a tree whose /bin, /sbin and /lib are links into /usr.
+debian_merge_usr() {
+  local name
   for name in bin sbin lib; do
-    mkdir -p "$tree/usr/$name"
-    [[ -L $tree/$name ]] || ln -s "usr/$name" "$tree/$name"
+    mkdir -p "$1/usr/$name"
+    [[ -L $1/$name ]] || ln -s "usr/$name" "$1/$name"
   done
+}
+
+# TREE DEB: tells the names of what is unpacked. Documents and translations are of no use to a build nor to a board.
+debian_unpack_one() {
+  dpkg-deb --fsys-tarfile "$2" | tar -xv --quoting-style=literal -C "$1" --keep-directory-symlink --no-same-owner \
+    --exclude='./usr/share/doc/*' --exclude='./usr/share/man/*' --exclude='./usr/share/locale/*' \
+    --exclude='./usr/share/info/*' --exclude='./usr/share/lintian/*'
+}
+
+debian_unpack() {
+  local tree=$1 deb
+  shift
+  debian_merge_usr "$tree"
+  for deb in "$@"; do debian_unpack_one "$tree" "$deb" >/dev/null; done
+}
+
+# dpkg's database is written as dpkg itself leaves it: the status of all, and of each its files, scripts and triggers.
+debian_install() {
+  local tree=$1 dpkg=$1/var/lib/dpkg deb control name
+  shift
+  debian_merge_usr "$tree"
+  mkdir -p "$dpkg"/{info,updates,parts,triggers,alternatives} "$dpkg/control"
+  touch "$dpkg"/{available,diversions,statoverride,triggers/File}
   for deb in "$@"; do
-    dpkg-deb --fsys-tarfile "$deb" | tar -x -C "$tree" --keep-directory-symlink --no-same-owner \
-      --exclude='./usr/share/doc/*' --exclude='./usr/share/man/*' --exclude='./usr/share/locale/*' \
-      --exclude='./usr/share/info/*' --exclude='./usr/share/lintian/*'
+    control=$dpkg/control/one
+    dpkg-deb --control "$deb" "$control"
+    name=$(debian_dpkg_name "$control/control")
+    debian_unpack_one "$tree" "$deb" | sed 's|^\./$|/.|; s|^\./|/|; s|\(.\)/$|\1|' >"$dpkg/info/$name.list"
+    debian_dpkg_status "$tree" "$control" >>"$dpkg/status"
+    if [[ -f $control/triggers ]]; then debian_dpkg_triggers "$dpkg/triggers" "$name" <"$control/triggers"; fi
+    mv "$control" "$dpkg/control/$name"
+  done
+  # All at once: a process for each of thousands of files takes longer than the rest.
+  (cd "$dpkg/control" && find . -type f ! -name control -print0 | tar -c --null -T - --transform='s|^\./\([^/]*\)/|\1.|') |
+    tar -x -C "$dpkg/info" --no-same-owner
+  rm -rf "$dpkg/control"
+  echo 1 >"$dpkg/info/format"
+}
+
+# CONTROL: the package's name in dpkg's files; that of a library which may be there for several architectures has its own.
+debian_dpkg_name() {
+  local field value name='' architecture='' same=''
+  while read -r field value; do
+    case $field in
+      Package:) name=$value ;;
+      Architecture:) architecture=:$value ;;
+      Multi-Arch:) if [[ $value == same ]]; then same=1; fi ;;
+    esac
+  done <"$1"
+  echo "$name${same:+$architecture}"
+}
+
+# TREE FOLDER: the package's part of dpkg's status, by what it is controlled by.
+debian_dpkg_status() {
+  local line sum path
+  while IFS= read -r line; do
+    printf '%s\n' "$line"
+    if [[ $line == Package:* ]]; then echo "Status: install ok installed"; fi
+  done <"$2/control"
+  if [[ -f $2/conffiles ]]; then
+    echo "Conffiles:"
+    (cd "$1" && sed -n 's|^/||p' "$2/conffiles" | xargs -r md5sum) | while read -r sum path; do echo " /$path $sum"; done
+  fi
+  echo
+}
+
+# FOLDER NAME: which names and paths the package waits for.
+debian_dpkg_triggers() {
+  local kind what how
+  while read -r kind what; do
+    case $kind in
+      interest | interest-await) how= ;;
+      interest-noawait) how=/noawait ;;
+      *) continue ;;
+    esac
+    if [[ $what == /* ]]; then echo "$what $2$how" >>"$1/File"; else echo "$2$how" >>"$1/$what"; fi
   done
 }
 

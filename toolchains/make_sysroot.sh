@@ -62,29 +62,8 @@ debian_open "$folder.work/apt" "$release" "$architecture"
 debian_download_all "$folder.work/debs" "${packages[@]}"
 debian_close
 echo "sysroot: unpacking $(find "$folder.work/debs" -name '*.deb' | wc -l) packages"
-debian_unpack "$folder" "$folder.work"/debs/*.deb
-
-# What dpkg would have written, had it installed them.
-dpkg=$folder/var/lib/dpkg
-mkdir -p "$dpkg/info"
-echo 1 >"$dpkg/info/format"
-echo "$architecture" >"$dpkg/arch"
-: >"$dpkg/status"
-for deb in "$folder.work"/debs/*.deb; do
-  control=$folder.work/control
-  rm -rf "$control"
-  dpkg-deb --control "$deb" "$control"
-  package=$(sed -n 's/^Package: //p' "$control/control")
-  if grep -qx 'Multi-Arch: same' "$control/control"; then package+=:$architecture; fi
-  {
-    sed -e 's/^Package: .*/&\nStatus: install ok installed/' "$control/control"
-    echo
-  } >>"$dpkg/status"
-  for what in shlibs symbols; do
-    if [[ -f $control/$what ]]; then cp "$control/$what" "$dpkg/info/$package.$what"; fi
-  done
-  dpkg-deb --fsys-tarfile "$deb" | tar -t | sed -e 's|^\./|/|' -e 's|/$||' -e 's|^$|/.|' >"$dpkg/info/$package.list"
-done
+debian_install "$folder" "$folder.work"/debs/*.deb
+echo "$architecture" >"$folder/var/lib/dpkg/arch"
 # Programs of theirs do not run here.
 rm -rf "$folder.work" "${folder:?}"/usr/{bin,sbin,share/{fonts,icons,perl,vim}}
 

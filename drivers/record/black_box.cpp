@@ -8,7 +8,6 @@
 #include <exception>
 #include <stdexcept>
 #include <system_error>
-#include <tuple>
 #include <utility>
 
 #include "drivers/record/calibration_text.hpp"
@@ -407,7 +406,6 @@ About BlackBox::about_of(const Frozen& frozen) const {
 // Deletes the oldest recordings of ours until `bytes` more fit. Throws where the disk has too little all the same.
 void BlackBox::make_room(std::uint64_t bytes) {
   struct Old {
-    fs::file_time_type time;
     fs::path path;
     std::uint64_t bytes;
   };
@@ -416,15 +414,15 @@ void BlackBox::make_room(std::uint64_t bytes) {
   for (const fs::directory_entry& entry : fs::directory_iterator(config_.directory)) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(kPrefix) || !name.ends_with(".strec")) continue;
-    old.push_back({entry.last_write_time(), entry.path(), entry.file_size()});
+    old.push_back({entry.path(), entry.file_size()});
     sum += old.back().bytes;
   }
   if (bytes > config_.max_bytes) {
     throw std::runtime_error(config_.directory.string() + ": a recording of " + std::to_string(bytes >> 20U) +
                              " MB is more than record.max_mb; raise it, or lower record.seconds");
   }
-  std::sort(old.begin(), old.end(),
-            [](const Old& a, const Old& b) { return std::tie(a.time, a.path) < std::tie(b.time, b.path); });
+  // By session and frame, which only rise: the clock of a board without a battery goes back.
+  std::sort(old.begin(), old.end(), [](const Old& a, const Old& b) { return a.path < b.path; });
   for (auto oldest = old.begin(); oldest != old.end() && sum + bytes > config_.max_bytes; ++oldest) {
     fs::remove(oldest->path);
     sum -= oldest->bytes;
@@ -483,6 +481,8 @@ void BlackBox::write_some() {
     // Release: the frame loop may write the slot again; it has been read.
     released_.store(++write_next_, std::memory_order_release);
   }
+  // A power cut takes what lies in memory only: these frames stay.
+  if (!writer_.flush()) throw std::runtime_error(writer_.status());
 }
 
 void BlackBox::end() {
@@ -497,6 +497,7 @@ void BlackBox::end() {
   }
   if (!writer_.commit()) throw std::runtime_error(writer_.status());
   count(counters_.recordings);
+  last_error_.clear();
   writing_.reset();
 }
 

@@ -64,8 +64,8 @@ class BlackBox {
     int reduce = 1;                     ///< 1, 2, 4
     int every = 1;                      ///< 1..100
     std::filesystem::path directory{};  ///< must exist; the recordings' names begin with kPrefix
-    std::uint64_t max_bytes = 0;        ///< of all recordings in it; the oldest go, where there are more
-    int patience = 20;                  ///< rounds of service_step() that wait for the messages of the last frames
+    std::uint64_t max_bytes = 0;  ///< of all recordings in it; the oldest, by their names, go, where there are more
+    int patience = 20;            ///< rounds of service_step() that wait for the messages of the last frames
     std::uint64_t spare_bytes = std::uint64_t{64} << 20U;  ///< stay free on the disk
   };
   static constexpr const char* kPrefix = "stereotrack-";
@@ -122,7 +122,8 @@ class BlackBox {
 
   /// Takes a small piece of work: some frames of a recording. May wait for the disk. True: there is more.
   bool service_step() noexcept;
-  /// The path of the last recording, empty before the first; and what went wrong last, empty or one line.
+  /// The path of the last recording, empty before the first; and what went wrong since the last that was written, empty
+  /// or one line.
   [[nodiscard]] const std::string& last_recording() const noexcept { return last_recording_; }
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 

@@ -1,6 +1,7 @@
 #include "drivers/record/recording_writer.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -12,6 +13,27 @@
 #include "pipeline/core/checksum.hpp"
 
 namespace stereotrack::record {
+
+namespace {
+
+// A file that was renamed is found after a power cut only once its folder is on the disk, too.
+bool flush_folder_of(const std::filesystem::path& path) noexcept {
+  try {
+    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+    const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (directory < 0) return false;
+    const bool done = ::fsync(directory) == 0;
+    const int error = errno;
+    ::close(directory);
+    errno = error;
+    return done;
+  } catch (const std::exception&) {
+    errno = ENOMEM;
+    return false;
+  }
+}
+
+}  // namespace
 
 bool RecordingWriter::open(const std::filesystem::path& path) noexcept {
   abandon();
@@ -31,6 +53,8 @@ bool RecordingWriter::open(const std::filesystem::path& path) noexcept {
     error_ = errno;
     return false;
   }
+  // Says that somebody writes it, as long as the process lives.
+  (void)::flock(file_, LOCK_EX | LOCK_NB);
   const FileHeader header;
   return put(std::as_bytes(std::span(&header, 1)));
 }
@@ -63,6 +87,12 @@ bool RecordingWriter::write(RecordKind kind, std::span<const std::byte> payload)
   return put(whole) && put(payload);
 }
 
+bool RecordingWriter::flush() noexcept {
+  if (file_ < 0 || error_ != 0) return false;
+  if (::fdatasync(file_) != 0) error_ = errno;
+  return error_ == 0;
+}
+
 bool RecordingWriter::commit() noexcept {
   const EndMeta end = end_;
   if (!write(RecordKind::kEnd, std::as_bytes(std::span(&end, 1)))) {
@@ -73,7 +103,11 @@ bool RecordingWriter::commit() noexcept {
   if (::close(file_) != 0 && error_ == 0) error_ = errno;
   file_ = -1;
   if (error_ == 0 && std::rename(part_.c_str(), path_.c_str()) != 0) error_ = errno;
-  if (error_ != 0) ::unlink(part_.c_str());
+  if (error_ != 0) {
+    ::unlink(part_.c_str());
+    return false;
+  }
+  if (!flush_folder_of(path_)) error_ = errno;
   return error_ == 0;
 }
 

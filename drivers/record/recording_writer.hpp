@@ -13,7 +13,8 @@ namespace stereotrack::record {
 
 /// Writes a recording, record by record, to `PATH.part`, which commit() renames to `PATH`: a file of that name is
 /// whole. For the service thread: it waits for the disk, and never throws once it was made. After the first write that
-/// failed (disk full) nothing more is written and nothing stays. One thread.
+/// failed (disk full) nothing more is written and nothing stays. What a process leaves that ends amid it, or a power
+/// cut, is keep_torn()'s. One thread.
 class RecordingWriter {
  public:
   RecordingWriter() = default;
@@ -26,6 +27,9 @@ class RecordingWriter {
 
   /// One record of that payload. False: see status().
   bool write(RecordKind kind, std::span<const std::byte> payload) noexcept;
+
+  /// What was written so far is on the disk. False: see status().
+  bool flush() noexcept;
 
   /// The end record; makes the file whole: on the disk, under its name. False: see status(), and nothing stays.
   [[nodiscard]] bool commit() noexcept;

@@ -10,6 +10,7 @@
 
 #include "config/error.hpp"
 #include "drivers/capture/film/film.hpp"
+#include "drivers/record/torn.hpp"
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/endpoint.hpp"
 #include "drivers/telemetry/session_file.hpp"
@@ -260,7 +261,12 @@ int run(const Arguments& arguments) {
   }
   const fs::path state = state_directory(configuration);
   fs::create_directories(state);
-  if (configuration.record.on) fs::create_directories(configuration.record.directory);
+  if (configuration.record.on) {
+    fs::create_directories(configuration.record.directory);
+    for (const std::string& line : record::keep_torn(configuration.record.directory)) {
+      log(LogLevel::kNotice, "recording: " + line, {{"STEREOTRACK_CAUSE", "record"}});
+    }
+  }
   parts.session = telemetry::next_session(state);
   parts.lines = gpio::open_lines(signals::line_specs(configuration), "stereotrackd");
   parts.inputs = daemon::Inputs(inputs);

@@ -16,8 +16,10 @@
   board.py targets [GROUP|GROUP/CASE]...               the CMake targets that the cases want
 
 A case is cases/GROUP/CASE.sh. It prints TAP (guest/tap.sh) and says in its head, in comments: "# wants: bin/PROGRAM ..."
-what it wants of the build folder, "# brings: PATH ..." what of the project's files the programs read (they find them where
-they were when they were built), "# limit: SECONDS" of the board's clock (120).
+what it wants of the build folder (packages/NAME: the .deb of that name), "# brings: PATH ..." what of the project's files
+the programs read (they find them where they were when they were built), "# limit: SECONDS" of the board's clock (120),
+"# power cuts: N" how often it asks for one (0): the emulator is killed, the board boots anew with the disks as they are,
+and the case is called again, its first argument the number of cuts so far.
 
 Everything lies in build/board, or where STEREOTRACK_BOARD_CACHE says. The board is booted once and its state is saved;
 each run starts from there, in seconds, on disks that forget. No board outlives board.py.
@@ -54,6 +56,7 @@ CACHE = pathlib.Path(os.environ.get("STEREOTRACK_BOARD_CACHE") or PROJECT / "bui
 CLOCKS = {"steady": ["-accel", "tcg,thread=single", "-icount", "shift=1,sleep=off"], "real": ["-accel", "tcg,thread=multi"]}
 # The saved state knows the size of the disk that it will find.
 PAYLOAD_SIZE = 2 << 30
+DATA_SIZE = 512 << 20
 BOOT_LIMIT_S = 300
 # Of the host, beyond the time limit of the board's clock: an emulator on a busy host.
 HOST_FACTOR = 10
@@ -62,6 +65,7 @@ HUNG = 124
 MOST_JOBS = 4
 # Loaded before there are threads: a child between fork and exec may not load it.
 LIBC = ctypes.CDLL(None)
+CUT = re.compile(r"board: cut the power after (\d+) facts and (\d+) s")
 
 
 class BoardError(Exception):
@@ -82,18 +86,21 @@ def die_with_parent():
     LIBC.prctl(pr_set_pdeathsig, signal.SIGKILL)
 
 
-def machine_options(clock, folder, disk, payload, forgetful):
-    """Of the emulator: a board with its files in `folder`. forgetful: what it writes to `disk` is not kept."""
+def machine_options(clock, folder, disk, forgetful, kernel_words=""):
+    """Of the emulator: a board with its files in `folder`. forgetful: what it writes to `disk` is not kept. Else, and on
+    the data disk, what the board has flushed outlives the emulator, however that ends."""
     return [
         "-M", "virt", "-cpu", "cortex-a72", *CLOCKS[clock], "-smp", "2", "-m", "1024",
         "-nodefaults", "-nographic", "-no-reboot", "-monitor", "none", "-serial", f"file:{folder}/console.log",
         "-qmp", f"unix:{folder}/qmp,server=on,wait=off",
         "-kernel", str(CACHE / "vmlinuz"), "-initrd", str(CACHE / "initrd.gz"),
-        "-append", "console=ttyAMA0 loglevel=4 panic=1 systemd.show_status=0",
-        "-drive", f"file={disk},if=none,id=root,format=qcow2" + (",snapshot=on" if forgetful else ""),
+        "-append", f"console=ttyAMA0 loglevel=4 panic=1 systemd.show_status=0 {kernel_words}".rstrip(),
+        "-drive", f"file={disk},if=none,id=root,format=qcow2" + (",snapshot=on" if forgetful else ",cache=writeback"),
         "-device", "virtio-blk-pci,drive=root",
-        "-drive", f"file={payload},if=none,id=payload,format=raw,readonly=on",
-        "-device", "virtio-blk-pci,drive=payload", "-device", "virtio-rng-pci", "-device", "virtio-serial-pci",
+        "-drive", f"file={folder}/payload.ext4,if=none,id=payload,format=raw,readonly=on",
+        "-device", "virtio-blk-pci,drive=payload",
+        "-drive", f"file={folder}/data.ext4,if=none,id=data,format=raw,cache=writethrough",
+        "-device", "virtio-blk-pci,drive=data", "-device", "virtio-rng-pci", "-device", "virtio-serial-pci",
         "-chardev", "stdio,id=control,signal=off", "-device", "virtserialport,chardev=control,name=board.control",
         "-chardev", f"file,id=files,path={folder}/files.tar", "-device", "virtserialport,chardev=files,name=board.files"]
 
@@ -101,11 +108,11 @@ def machine_options(clock, folder, disk, payload, forgetful):
 class Machine:
     """A running emulator. Its control port is its standard input and output; lines of "board: " are the agent's."""
 
-    def __init__(self, folder, clock, disk, payload, extra):
+    def __init__(self, folder, options):
         self.console = folder / "console.log"
         self.qmp = folder / "qmp"
         self.buffer = b""
-        command = ["qemu-system-aarch64", *machine_options(clock, folder, disk, payload, bool(extra)), *extra]
+        command = ["qemu-system-aarch64", *options]
         environment = {**os.environ, "TMPDIR": str(folder)}
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment,
                                         preexec_fn=die_with_parent)
@@ -201,7 +208,8 @@ def make_alone(clock):
     sweep()
     subprocess.run([HERE / "make_image.sh", CACHE], check=True, stdout=sys.stderr)
     version = subprocess.run(["qemu-system-aarch64", "--version"], check=True, capture_output=True, text=True).stdout
-    key = " ".join([(CACHE / "id").read_text(), version, *map(str, machine_options(clock, "", "", "", True)), str(PAYLOAD_SIZE)])
+    key = " ".join([(CACHE / "id").read_text(), version, *map(str, machine_options(clock, "", "", True)), str(PAYLOAD_SIZE),
+                    str(DATA_SIZE)])
     folder = CACHE / f"saved-{clock}-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     disk, state = folder / "disk.qcow2", folder / "state"
     if folder.exists():
@@ -214,10 +222,10 @@ def make_alone(clock):
         os.link(CACHE / "root.ext4", work / "root.ext4")
         subprocess.run(["qemu-img", "create", "-q", "-f", "qcow2", "-b", "root.ext4", "-F", "raw", work / "disk.qcow2"],
                        check=True)
-        payload = work / "payload"
-        payload.touch()
-        os.truncate(payload, PAYLOAD_SIZE)
-        with Machine(work, clock, work / "disk.qcow2", payload, []) as machine:
+        for name, size in (("payload.ext4", PAYLOAD_SIZE), ("data.ext4", DATA_SIZE)):
+            (work / name).touch()
+            os.truncate(work / name, size)
+        with Machine(work, machine_options(clock, work, work / "disk.qcow2", False)) as machine:
             try:
                 for line in machine.lines(begin + BOOT_LIMIT_S):
                     note(line.removeprefix("board: "))
@@ -229,7 +237,7 @@ def make_alone(clock):
                 raise BoardError(f"the board did not boot in {BOOT_LIMIT_S} s; its console:\n"
                                  + machine.console_tail()) from None
             machine.save(work / "state")
-        for name in ("payload", "files.tar", "qmp"):
+        for name in ("payload.ext4", "data.ext4", "files.tar", "qmp"):
             (work / name).unlink(missing_ok=True)
         for old in CACHE.glob(f"saved-{clock}-*"):
             shutil.rmtree(old)
@@ -252,48 +260,82 @@ def add(source, target):
     shutil.copy(source, target)
 
 
-def run(clock, things, start, time_limit, results, hear):
+def make_disk(path, size, *options):
+    path.touch()
+    os.truncate(path, size)
+    subprocess.run(["mkfs.ext4", "-q", "-F", "-E", "root_owner=0:0", *options, path], check=True)
+
+
+def make_disks(work, things, start):
+    """The payload, whose /payload/.board/start is `start`; and a data disk with a journal, as a board has it."""
+    tree = work / "payload"
+    for inside, path in things.items():
+        add(path, tree / inside)
+    add(HERE / "guest/limited.sh", tree / ".board/limited.sh")
+    (tree / ".board/start").write_text("source /payload/.board/limited.sh\ncd /payload\nSECONDS=0\n"
+                                       f"{start}\ncode=$?\necho \"board: took $SECONDS\"\nexit $code\n")
+    make_disk(work / "payload.ext4", PAYLOAD_SIZE, "-O", "^has_journal", "-d", tree)
+    # All is written now: nothing is left to the board to do in idle moments.
+    make_disk(work / "data.ext4", DATA_SIZE, "-E", "lazy_itable_init=0,lazy_journal_init=0")
+
+
+def run(clock, things, start, time_limit, results, hear, cuts=0):
     """Runs the script `start` on a board with the things (name in /payload -> path here). hear(line) is told each line
-    of its output. Its exit code, and how long it took by the board's clock [s]. Raises BoardError where no exit code
-    comes."""
+    of its output. Its exit code, and how long it took by the board's clock [s]. It may ask for so many power cuts.
+    Raises BoardError where no exit code comes."""
     disk, state = make(clock)
     with tempfile.TemporaryDirectory(dir=CACHE, prefix="run-") as name, locked(name):
         work = pathlib.Path(name)
-        tree = work / "payload"
-        for inside, path in things.items():
-            add(path, tree / inside)
-        add(HERE / "guest/limited.sh", tree / ".board/limited.sh")
-        (tree / ".board/start").write_text("source /payload/.board/limited.sh\ncd /payload\nSECONDS=0\n"
-                                           f"{start}\ncode=$?\necho \"board: took $SECONDS\"\nexit $code\n")
-        image = work / "payload.ext4"
-        image.touch()
-        os.truncate(image, PAYLOAD_SIZE)
-        subprocess.run(["mkfs.ext4", "-q", "-F", "-O", "^has_journal", "-E", "root_owner=0:0", "-d", tree, image], check=True)
-        incoming = f"exec:cat {shlex.quote(str(state))}"
-        limit_s = 30 + HOST_FACTOR * time_limit
-        last = "nothing"
-        took = 0
-        with Machine(work, clock, disk, image, ["-incoming", incoming]) as machine:
-            machine.say(f"start {int(time.time())}")
-            try:
-                for line in machine.lines(time.monotonic() + limit_s):
-                    if line.startswith("board: end "):
-                        code = int(line.removeprefix("board: end "))
-                        break
-                    if line.startswith("board: took "):
-                        took = int(line.removeprefix("board: took "))
-                    elif line != "board: ready":
-                        last = line
-                        hear(line)
-            except TimeoutError:
-                raise BoardError(f"the board itself hangs: no end after {limit_s} s of the host's clock; it last said: "
-                                 f"{last}\nits console:\n{machine.console_tail()}") from None
+        make_disks(work, things, start)
+        if cuts > 0:
+            own = work / "disk.qcow2"
+            subprocess.run(["qemu-img", "create", "-q", "-f", "qcow2", "-b", disk, "-F", "qcow2", own], check=True)
+            disk = own
+        options = machine_options(clock, work, disk, cuts == 0)
+        code, took, facts = run_once(work, [*options, "-incoming", f"exec:cat {shlex.quote(str(state))}"], hear,
+                                     30 + HOST_FACTOR * time_limit)
+        for cut in range(1, cuts + 1):
+            if code is not None:
+                break
+            options = machine_options(clock, work, disk, False, f"board.cuts={cut} board.facts={facts}")
+            code, more, facts = run_once(work, options, hear, BOOT_LIMIT_S + HOST_FACTOR * time_limit, boots=True)
+            took += more
+        if code is None:
+            raise BoardError(f"it asks for a power cut more than the {cuts} that its head tells of")
         if results:
             shutil.rmtree(results, ignore_errors=True)
             pathlib.Path(results).mkdir(parents=True)
             with tarfile.open(work / "files.tar") as archive:
                 archive.extractall(results)
     return code, took
+
+
+def run_once(work, options, hear, limit_s, boots=False):
+    """From power on to the end of what it runs, or to the power cut that this asks for. The exit code, None where the
+    power was cut; seconds of the board's clock; facts that were told before the cut."""
+    last = "nothing"
+    took = 0
+    with Machine(work, options) as machine:
+        begin = f"start {int(time.time())}"
+        if not boots:
+            machine.say(begin)
+        try:
+            for line in machine.lines(time.monotonic() + limit_s):
+                if cut := CUT.fullmatch(line):
+                    return None, int(cut[2]), int(cut[1])
+                if line.startswith("board: end "):
+                    return int(line.removeprefix("board: end ")), took, 0
+                if line.startswith("board: took "):
+                    took = int(line.removeprefix("board: took "))
+                elif line != "board: ready":
+                    last = line
+                    hear(line)
+                elif boots:
+                    machine.say(begin)
+        except TimeoutError:
+            raise BoardError(f"the board itself hangs: no end after {limit_s} s of the host's clock; it last said: "
+                             f"{last}\nits console:\n{machine.console_tail()}") from None
+    raise BoardError("the board said nothing of an end")
 
 
 def command_run(args):
@@ -315,7 +357,8 @@ class Case:
         head = path.read_text()
         self.wants, self.brings = ([name for line in re.findall(rf"^# {word}: (.*)$", head, re.M) for name in line.split()]
                                    for word in ("wants", "brings"))
-        self.limit = int((re.findall(r"^# limit: (\d+)$", head, re.M) or [120])[0])
+        self.limit, self.cuts = (int((re.findall(rf"^# {word}: (\d+)$", head, re.M) or [default])[0])
+                                 for word, default in (("limit", 120), ("power cuts", 0)))
         self.facts = []  # (name, "ok" | "not ok" | "skip", text)
         self.comments = []
         self.plan = None
@@ -374,18 +417,36 @@ def write_junit(cases, path):
     pathlib.Path(path).write_bytes(xml.tostring(root))
 
 
+def wanted(build, want):
+    """The file of the build folder that a case calls so."""
+    if not want.startswith("packages/"):
+        return build / want
+    found = sorted(build.glob(f"{want}_*.deb"))
+    if len(found) != 1:
+        said = ", ".join(path.name for path in found) or "none"
+        raise UsageError(f"want one package {build / want}_*.deb, there is: {said}; make it: cmake --build {build} --target packages")
+    return found[0]
+
+
+def target_of(want):
+    """The CMake target that makes it."""
+    return "packages" if want.startswith("packages/") else pathlib.Path(want).name
+
+
 def run_case(case, args, results):
     build = pathlib.Path(args.build)
-    things = {"case.sh": case.path, ".board/tap.sh": HERE / "guest/tap.sh",
-              ".board/daemon.sh": HERE / "guest/daemon.sh"}
-    things.update({pathlib.Path(want).name: build / want for want in case.wants})
+    things = {"case.sh": case.path, **{f".board/{name}.sh": HERE / f"guest/{name}.sh" for name in ("tap", "daemon", "rig")}}
+    for want in case.wants:
+        path = wanted(build, want)
+        things[path.name] = path
     things.update({f".board/project/{path}": PROJECT / path for path in case.brings})
     start = (f"mkdir -p {shlex.quote(str(PROJECT.parent))}\n"
              f"ln -s /payload/.board/project {shlex.quote(str(PROJECT))}\n"
-             f"limited {case.limit} {case.name} bash case.sh")
+             f"FACTS=$(kernel_word board.facts) limited {case.limit} {case.name} bash case.sh \"$(kernel_word board.cuts)\"")
     begin = time.monotonic()
     try:
-        code, case.board_seconds = run(args.clock, things, start, case.limit, results / case.name, case.hear)
+        code, case.board_seconds = run(args.clock, things, start, case.limit, results / case.name, case.hear,
+                                       case.cuts)
         case.finish(code)
     except BoardError as error:
         case.comments += str(error).splitlines()
@@ -436,7 +497,7 @@ def command_test(args):
 
 
 def command_targets(args):
-    print(*sorted({pathlib.Path(want).name for case in cases_of(args.names) for want in case.wants}))
+    print(*sorted({target_of(want) for case in cases_of(args.names) for want in case.wants}))
     return 0
 
 

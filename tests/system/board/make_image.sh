@@ -2,7 +2,8 @@
 # The board: Debian's own kernel and packages for arm64, unpacked only.
 #     FOLDER/vmlinuz     Debian's kernel
 #     FOLDER/initrd.gz   loads the modules of the disk and goes on with it
-#     FOLDER/root.ext4   Debian with systemd, udev, v4l-utils, gpiod, libcamera, our programs' libraries, modules
+#     FOLDER/root.ext4   Debian with systemd, udev, v4l-utils, gpiod, libcamera, our programs' libraries, modules; apt
+#                        and dpkg know of all that, as on a board, and install, upgrade and remove without a network
 #     FOLDER/id          changes with each of them
 # Packages come from this machine's mirrors (toolchains/debian_packages.sh). Each part carries a stamp of what it is made
 # of; what is there and fits is kept. Remove FOLDER to have newer packages.
@@ -13,8 +14,9 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=toolchains/debian_packages.sh
 source "$here/../../../toolchains/debian_packages.sh"
 
-packages=(base-files base-passwd bash dash coreutils util-linux mount sed grep gawk findutils tar gzip login libc-bin
-  init-system-helpers libpam-modules libpam-runtime systemd systemd-sysv udev kmod dbus procps iproute2 strace
+packages=(base-files base-passwd bash dash coreutils util-linux bsdutils mount sed grep gawk findutils diffutils tar gzip
+  hostname login libc-bin ncurses-bin perl-base usr-is-merged dpkg apt debconf init-system-helpers libpam-modules
+  libpam-runtime systemd systemd-sysv udev kmod dbus procps iproute2 strace
   v4l-utils gpiod libcamera-tools libcamera-ipa curl
   # What our programs are linked with.
   libgpiod2 libstdc++6 libhwy1 libsodium23 libsystemd0 libyaml-cpp0.7 libcpp-httplib0.11
@@ -57,7 +59,7 @@ if ! is_made tree "$tree_stamp"; then
   debian_download_all "$work/debs" "${packages[@]}"
   debian_close
   say "unpacking $(find "$work/debs" -name '*.deb' | wc -l) packages"
-  debian_unpack "$folder/tree" "$work"/debs/*.deb
+  debian_install "$folder/tree" "$work"/debs/*.deb
   rm -rf "$work"
   echo "$tree_stamp" >"$folder/tree.stamp"
 fi
@@ -81,6 +83,7 @@ put() {
 put etc/passwd <"$tree/usr/share/base-passwd/passwd.master"
 put etc/group <"$tree/usr/share/base-passwd/group.master"
 {
+  grep -q '^_apt:' "$tree/usr/share/base-passwd/passwd.master" || echo "_apt:x:42:65534::/nonexistent:/usr/sbin/nologin"
   echo "messagebus:x:100:102::/nonexistent:/usr/sbin/nologin"
   echo "systemd-network:x:998:998::/:/usr/sbin/nologin"
 } >>"$tree/etc/passwd"

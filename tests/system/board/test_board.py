@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 import unittest
+import unittest.mock
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
@@ -110,6 +111,85 @@ class Facts(unittest.TestCase):
         self.assertEqual(facts, [("comes", "ok")])
 
 
+class Wanted(unittest.TestCase):
+    def test_a_package_is_made_by_the_target_of_all(self):
+        self.assertEqual(board.target_of("packages/stereotrack-tools"), "packages")
+        self.assertEqual(board.target_of("tests/gpio_board_test"), "gpio_board_test")
+
+    def test_a_package_is_the_one_deb_of_that_name(self):
+        with tempfile.TemporaryDirectory() as name:
+            build = pathlib.Path(name)
+            (build / "packages").mkdir()
+            self.assertEqual(board.wanted(build, "bin/stereotrackd"), build / "bin/stereotrackd")
+            with self.assertRaisesRegex(board.UsageError, "there is: none"):
+                board.wanted(build, "packages/stereotrack")
+            (build / "packages/stereotrack-tools_1.0_arm64.deb").touch()
+            (build / "packages/stereotrack_1.0_arm64.deb").touch()
+            self.assertEqual(board.wanted(build, "packages/stereotrack").name, "stereotrack_1.0_arm64.deb")
+            (build / "packages/stereotrack_1.1_arm64.deb").touch()
+            with self.assertRaisesRegex(board.UsageError, "_1.0_arm64.deb, .*_1.1_arm64.deb"):
+                board.wanted(build, "packages/stereotrack")
+
+
+class PowerCut(unittest.TestCase):
+    """board.run with emulators that say what they are told to here, and are killed where the real ones would be."""
+
+    def boards(self, *says, cuts):
+        begun, killed = [], []
+
+        class Emulator:
+            def __init__(self, _, options):
+                self.said = says[len(begun)]
+                self.heard = []
+                begun.append((options, self.heard))
+
+            def __enter__(self):
+                return self
+
+            def __exit__(self, *_):
+                killed.append(len(begun))
+
+            def say(self, text):
+                self.heard.append(text)
+
+            def lines(self, _):
+                yield from self.said
+
+        told = []
+        with tempfile.TemporaryDirectory() as name, unittest.mock.patch.multiple(
+                board, CACHE=pathlib.Path(name), Machine=Emulator, make_disks=lambda *_: None,
+                make=lambda _: (pathlib.Path(name) / "disk.qcow2", "state")):
+            subprocess.run(["qemu-img", "create", "-q", "-f", "qcow2", f"{name}/disk.qcow2", "1M"], check=True)
+            result = board.run("steady", {}, "start", 5, None, told.append, cuts)
+        self.assertEqual(killed, list(range(1, len(begun) + 1)))
+        return result, told, begun
+
+    def test_boots_the_board_anew_with_its_disks_and_goes_on_counting(self):
+        result, told, begun = self.boards(
+            ["ok 1 - before", "board: cut the power after 1 facts and 7 s", "ok 2 - never heard"],
+            ["board: ready", "ok 2 - after", "board: took 5", "board: end 0"], cuts=1)
+        self.assertEqual(result, (0, 12))
+        self.assertEqual(told, ["ok 1 - before", "ok 2 - after"])
+        first, second = ([str(word) for word in options] for options, _ in begun)
+        self.assertIn("-incoming", first)
+        self.assertNotIn("-incoming", second)
+        self.assertIn("board.cuts=1 board.facts=1", " ".join(second))
+        disks = [[word for word in words if word.startswith("file=") and "control" not in word] for words in (first, second)]
+        self.assertEqual(disks[0], disks[1])
+        self.assertFalse([word for word in disks[0] if "snapshot=on" in word])
+        for _, heard in begun:
+            self.assertEqual([text.split()[0] for text in heard], ["start"])
+
+    def test_that_no_head_tells_of_is_refused(self):
+        with self.assertRaisesRegex(board.BoardError, "a power cut more than the 0"):
+            self.boards(["board: cut the power after 0 facts and 0 s"], cuts=0)
+
+    def test_facts_are_counted_on_by_the_case(self):
+        done = subprocess.run(["bash", "-c", f"source {HERE}/guest/tap.sh; fact yes true; finish"], capture_output=True,
+                              text=True, env={"PATH": "/usr/bin:/bin", "FACTS": "4"})
+        self.assertEqual(done.stdout, "ok 5 - yes\n1..5\n")
+
+
 class Cases(unittest.TestCase):
     def test_are_found_by_group_and_by_name(self):
         every = [case.name for case in board.cases_of([])]
@@ -123,6 +203,8 @@ class Cases(unittest.TestCase):
         case = board.cases_of(["daemon/live"])[0]
         self.assertIn("bin/stereotrackd", case.wants)
         self.assertEqual(case.limit, 240)
+        self.assertEqual(case.cuts, 0)
+        self.assertEqual(board.cases_of(["rig/power_cut"])[0].cuts, 2)
 
 
 class SideBySide(unittest.TestCase):

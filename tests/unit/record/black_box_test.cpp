@@ -340,6 +340,7 @@ TEST(BlackBox, FullDiskIsCountedAndTheNextRecordingIsWritten) {
   EXPECT_EQ(rig.counters().recordings, 1U);
   EXPECT_EQ(rig.counters().frames_dropped, 0U);
   EXPECT_GE(rig.replay(rig.box().last_recording()), 15);
+  EXPECT_EQ(rig.box().last_error(), "") << "a failure like the one before would not be news";
 }
 
 TEST(BlackBox, TheOldestRecordingsGoWhereThereAreTooMany) {
@@ -362,6 +363,29 @@ TEST(BlackBox, TheOldestRecordingsGoWhereThereAreTooMany) {
   EXPECT_TRUE(fs::exists(folder / "somebody-elses.strec"));
   EXPECT_TRUE(fs::exists(written[4]));
   EXPECT_FALSE(fs::exists(written[0]));
+}
+
+// A board without a battery starts in the past.
+TEST(BlackBox, WhichIsTheOldestIsNotAskedOfTheClock) {
+  const TempDir folder;
+  BlackBox::Config config;
+  config.max_bytes = 12U << 20U;
+  // Of the session before 0xABC, and written "tomorrow".
+  const fs::path before =
+      folder.write("stereotrack-0000000000000abb-0000000900-demand.strec", std::string(6'000'000, 'x'));
+  fs::last_write_time(before, fs::file_time_type::clock::now() + std::chrono::hours(24));
+  Rig rig(robust(), folder.path(), config);
+  std::vector<std::string> written;
+  for (int ordinal = 1; ordinal <= 80; ++ordinal) {
+    rig.step(ordinal);
+    if (ordinal % 40 == 30) rig.box().trigger(kDeadlineMiss);
+    if (ordinal % 40 != 0) continue;
+    rig.serve();
+    written.push_back(rig.box().last_recording());
+  }
+  EXPECT_EQ(rig.counters().recordings, 2U) << rig.box().last_error();
+  EXPECT_FALSE(fs::exists(before));
+  EXPECT_TRUE(fs::exists(written[0]));
 }
 
 TEST(BlackBox, ReducedKeepsTheMeanOfLumaOfEverySecondFrameAndIsNotExact) {

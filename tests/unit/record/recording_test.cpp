@@ -8,6 +8,7 @@
 #include "drivers/record/calibration_text.hpp"
 #include "drivers/record/recording_source.hpp"
 #include "drivers/record/recording_writer.hpp"
+#include "drivers/record/torn.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace stereotrack::record {
@@ -229,6 +230,56 @@ TEST(RecordingWriter, AFolderThatIsNotThereIsOneLine) {
   RecordingWriter writer;
   EXPECT_FALSE(writer.open(folder / "none" / "x.strec"));
   EXPECT_NE(writer.status().find("check the folder"), std::string::npos);
+}
+
+// What a process leaves that is killed: the file that it wrote, up to somewhere, without a lock.
+TEST(Torn, IsKeptUpToItsLastWholeFrameUnderANameThatSaysSo) {
+  const TempDir folder;
+  write_recording(folder / "stereotrack-1.strec");
+  const std::vector<char> whole = bytes_of(folder / "stereotrack-1.strec");
+  fs::remove(folder / "stereotrack-1.strec");
+  put(folder / "stereotrack-1.strec.part", {whole.begin(), whole.end() - 700});
+  const std::vector<std::string> lines = keep_torn(folder.path());
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_NE(lines[0].find("stereotrack-1-torn.strec: is cut"), std::string::npos) << lines[0];
+  EXPECT_FALSE(fs::exists(folder / "stereotrack-1.strec.part"));
+  RecordingSource source((folder / "stereotrack-1-torn.strec").string());
+  EXPECT_NE(source.warning(), "");
+  EXPECT_EQ(frames_of(source), 3);
+  EXPECT_TRUE(keep_torn(folder.path()).empty()) << "once";
+}
+
+TEST(Torn, OneThatOnlyLacksItsNameGetsIt) {
+  const TempDir folder;
+  write_recording(folder / "stereotrack-1.strec");
+  fs::rename(folder / "stereotrack-1.strec", folder / "stereotrack-1.strec.part");
+  EXPECT_EQ(keep_torn(folder.path()).size(), 1U);
+  RecordingSource source((folder / "stereotrack-1.strec").string());
+  EXPECT_EQ(source.warning(), "");
+  EXPECT_EQ(frames_of(source), 4);
+}
+
+TEST(Torn, WhatHasNoFrameGoes) {
+  const TempDir folder;
+  (void)folder.write("stereotrack-1.strec.part", "");
+  (void)folder.write("stereotrack-2.strec.part", std::string(5000, '\0'));
+  EXPECT_EQ(keep_torn(folder.path()).size(), 2U);
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(Torn, WhatIsBeingWrittenAndWhatIsNotOursStays) {
+  const TempDir folder;
+  (void)folder.write("somebody-elses.strec.part", "x");
+  RecordingWriter writer;
+  ASSERT_TRUE(writer.open(folder / "stereotrack-1.strec"));
+  EXPECT_TRUE(keep_torn(folder.path()).empty());
+  EXPECT_TRUE(fs::exists(folder / "stereotrack-1.strec.part"));
+  EXPECT_TRUE(fs::exists(folder / "somebody-elses.strec.part"));
+}
+
+TEST(Torn, AFolderThatIsNotThereHasNone) {
+  const TempDir folder;
+  EXPECT_TRUE(keep_torn(folder / "none").empty());
 }
 
 }  // namespace

@@ -25,3 +25,15 @@ limited() {
   wait "$child" "$timer" 2>/dev/null
   return "$code"
 }
+
+# NAME: the number that the kernel was started with, NAME=NUMBER; else 0.
+kernel_word() {
+  local word
+  for word in $(</proc/cmdline); do
+    [[ $word != "$1="* ]] || {
+      echo "${word#*=}"
+      return
+    }
+  done
+  echo 0
+}

@@ -3,8 +3,10 @@
 #     fact NAME COMMAND...      holds where the command succeeds; what it says is told where not
 #     gtest PROGRAM [ARG...]    each of its tests is a fact
 #     eventually COMMAND...     succeeds as soon as the command does, tried for 20 s
+#     cut_the_power             does not return: the case is called again by the board that boots then
 #     finish                    the last line
-facts=0
+# Of before a power cut.
+facts=${FACTS:-0}
 
 tell() { sed 's/^/# /'; }
 
@@ -62,6 +64,12 @@ eventually() {
     sleep 0.25
   done
   "$@"
+}
+
+# At once, as power is cut: nothing is flushed.
+cut_the_power() {
+  echo "board: cut the power after $facts facts and $SECONDS s"
+  sleep infinity
 }
 
 finish() { echo "1..$facts"; }

@@ -5,6 +5,12 @@
 //     keep_telemetry compare LIVE REPLAYED
 //         each message in REPLAYED has to be in LIVE, with the same bytes. Says how many there are, how many of them
 //         have targets, and the first that differ
+//     keep_telemetry sessions FILE
+//         a line each, in the order in which they were heard: its first and last message, how many there were, how many
+//         went without a result of their own (flags 64 and 128), how many of its statuses, and all health that it told
+//         of
+//     keep_telemetry offsets FILE
+//         TAI minus capture clock [s], a line for each change by over a second
 #include <poll.h>
 #include <sys/signalfd.h>
 
@@ -13,10 +19,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
-#include <iterator>
+#include <cstdlib>
 #include <map>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -25,6 +30,7 @@
 #include "drivers/telemetry/file_sink.hpp"
 #include "drivers/telemetry/receiver.hpp"
 #include "drivers/telemetry/udp_listener.hpp"
+#include "tests/system/board/live/telemetry_file.hpp"
 
 namespace stereotrack {
 namespace {
@@ -59,24 +65,13 @@ int listen(const char* address, const char* path) {
 
 /// Those about pairs; a status is of its moment and in no replay.
 Messages read(const char* path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw std::runtime_error(std::string(path) + ": cannot be read");
-  const std::string file((std::istreambuf_iterator<char>(in)), {});
   Messages messages;
-  for (std::size_t at = 0; at + 4 <= file.size();) {
-    std::uint32_t size = 0;
-    std::memcpy(&size, file.data() + at, 4);
-    if (at + 4 + size > file.size()) throw std::runtime_error(std::string(path) + ": is cut");
-    const auto* const bytes = reinterpret_cast<const std::byte*>(file.data() + at + 4);
-    const auto datagram = telemetry::decode({bytes, size});
-    if (!datagram.has_value()) throw std::runtime_error(std::string(path) + ": holds what is no datagram of ours");
-    if (!datagram->status) {
-      Message& message = messages[datagram->header.sequence];
-      message.bytes.insert(message.bytes.end(), bytes, bytes + size);
-      message.targets += datagram->targets.size();
-    }
-    at += 4 + size;
-  }
+  each_datagram(path, [&](const telemetry::Datagram& datagram, std::span<const std::byte> bytes) {
+    if (datagram.status) return;
+    Message& message = messages[datagram.header.sequence];
+    message.bytes.insert(message.bytes.end(), bytes.begin(), bytes.end());
+    message.targets += datagram.targets.size();
+  });
   return messages;
 }
 
@@ -98,18 +93,72 @@ int compare(const char* live_path, const char* replayed_path) {
   return wrong == 0 && !replayed.empty() ? 0 : 1;
 }
 
+struct Session {
+  std::uint64_t number = 0;
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
+  std::uint64_t messages = 0;
+  std::uint64_t predicted = 0;
+  std::uint64_t statuses = 0;
+  std::uint32_t health = 0;
+};
+
+int sessions(const char* path) {
+  std::vector<Session> sessions;
+  each_datagram(path, [&](const telemetry::Datagram& datagram, std::span<const std::byte>) {
+    if (sessions.empty() || sessions.back().number != datagram.header.session) {
+      sessions.push_back({.number = datagram.header.session});
+    }
+    Session& session = sessions.back();
+    if (datagram.live) session.health |= datagram.live->health;
+    if (datagram.status) {
+      session.health |= datagram.status->health;
+      ++session.statuses;
+    } else if (datagram.header.part == 1) {
+      if (session.messages++ == 0) session.first = datagram.header.sequence;
+      session.last = datagram.header.sequence;
+      session.predicted += (datagram.header.flags & (64U | 128U)) != 0 ? 1 : 0;
+    }
+  });
+  for (const Session& session : sessions) {
+    (void)std::printf(
+        "session %llu first %llu last %llu messages %llu predicted %llu statuses %llu "
+        "health %u\n",
+        static_cast<unsigned long long>(session.number), static_cast<unsigned long long>(session.first),
+        static_cast<unsigned long long>(session.last), static_cast<unsigned long long>(session.messages),
+        static_cast<unsigned long long>(session.predicted), static_cast<unsigned long long>(session.statuses),
+        session.health);
+  }
+  return sessions.empty() ? 1 : 0;
+}
+
+int offsets(const char* path) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  std::int64_t last = 0;
+  each_datagram(path, [&](const telemetry::Datagram& datagram, std::span<const std::byte>) {
+    if (!datagram.live) return;
+    const std::int64_t now = datagram.live->tai_offset.count();
+    if (std::abs(now - last) > kSecond_ns) (void)std::printf("%lld\n", static_cast<long long>(now / kSecond_ns));
+    last = now;
+  });
+  return last != 0 ? 0 : 1;
+}
+
 }  // namespace
 }  // namespace stereotrack
 
 int main(int count, char** words) {
-  const std::string_view verb = count == 4 ? words[1] : "";
+  const std::string_view verb = count > 1 ? words[1] : "";
   try {
-    if (verb == "listen") return stereotrack::listen(words[2], words[3]);
-    if (verb == "compare") return stereotrack::compare(words[2], words[3]);
+    if (verb == "listen" && count == 4) return stereotrack::listen(words[2], words[3]);
+    if (verb == "compare" && count == 4) return stereotrack::compare(words[2], words[3]);
+    if (verb == "offsets" && count == 3) return stereotrack::offsets(words[2]);
+    if (verb == "sessions" && count == 3) return stereotrack::sessions(words[2]);
   } catch (const std::exception& error) {
     (void)std::fprintf(stderr, "keep_telemetry: %s\n", error.what());
     return 1;
   }
-  (void)std::fprintf(stderr, "usage: keep_telemetry listen ADDR:PORT FILE | compare LIVE REPLAYED\n");
+  (void)std::fprintf(
+      stderr, "usage: keep_telemetry listen ADDR:PORT FILE | compare LIVE REPLAYED | sessions FILE | offsets FILE\n");
   return 2;
 }

@@ -1,0 +1,89 @@
+#!/bin/bash
+# Power is cut, twice: as soon as a recording counts as written, and while another is being written. What counted as
+# written is whole, the other one is there up to its last whole frame, and the service comes up by itself each time.
+# What it keeps lies on a disk with a journal; what the board had not flushed is lost.
+# wants: packages/stereotrack packages/stereotrack-tools
+# limit: 300
+# power cuts: 2
+# shellcheck source=tests/system/board/guest/tap.sh
+source /payload/.board/tap.sh
+# shellcheck source=tests/system/board/guest/rig.sh
+source /payload/.board/rig.sh
+
+written='stereotrack_recordings_total{fate="written"}'
+# A frame of a recording: two pictures of 320x240 in colour, and their heads.
+frame_bytes=$((2 * 320 * 240 * 3 + 1024 + 32))
+session() { figure stereotrack_session; }
+ask() { systemctl kill --signal=USR1 stereotrackd; }
+size_of_part() { stat -c %s $recordings/*.part 2>/dev/null || echo 0; }
+replays() { stereotrack replay "$1" --out "$2" >"$2.txt" 2>&1; }
+
+case $1 in
+  0)
+    fact "what the service keeps is on a disk of its own" use_data_disk
+    fact "the packages are installed" install_rig
+    configure <<END
+[source]
+name = "synthetic:eleven"
+fps = 10.0
+[synthetic]
+frames = 30
+width = 320
+height = 240
+[latency]
+output_ms = 150.0
+late_ms = 20.0
+grace_ms = 20.0
+[record]
+on = true
+seconds = 10.0
+seconds_after = 0.2
+on_deadline = false
+END
+    fact "the service is to start with the board" systemctl enable stereotrackd
+    sync
+    fact "the service is ready" begin
+    fact "it runs" runs 110
+    echo "session $(session)" | tell
+    fact "it is asked to record" ask
+    fact "and has written" eventually is "$written" 1
+    cut_the_power
+    ;;
+  1)
+    fact "with power again the service comes up by itself" eventually is_ready
+    echo "READY $(property ActiveEnterTimestampMonotonic) us after the kernel began" | tell
+    fact "in the next session" test "$(session)" = 2
+    fact "what counted as written has its name" test "$(find $recordings -name '*-demand.strec' | wc -l)" = 1
+    fact "nothing else is there" test "$(find $recordings -type f | wc -l)" = 1
+    fact "it replays" replays "$(echo $recordings/*.strec)" /run/first
+    fact "without a word of damage" sh -c '! grep -E "cut|damaged" /run/first.txt'
+    tell </run/first.txt
+    fact "it runs" runs 110
+    fact "it is asked to record" ask
+    until (($(size_of_part) > 40 * frame_bytes)); do :; done
+    cut_the_power
+    ;;
+  2)
+    fact "it comes up once more" eventually is_ready
+    fact "in the session after that" test "$(session)" = 3
+    fact "the first recording is still there" test -e $recordings/*0000000000000001-*-demand.strec
+    find $recordings -type f -printf '%f %s\n' | tell
+    torn=$(echo $recordings/*0000000000000002-*.strec)
+    fact "the one that was being written is there, under its name" test -e "$torn"
+    fact "nothing half done is" test -z "$(find $recordings -name '*.part')"
+    fact "it replays" replays "$torn" /run/torn
+    tell </run/torn.txt
+    # "... cut or damaged after byte A of B: read up to frame N (M frames)"
+    read -r after all frames < <(sed -n 's/.*after byte \([0-9]*\) of \([0-9]*\): .*(\([0-9]*\) frames).*/\1 \2 \3/p' /run/torn.txt)
+    fact "and it is said where it is cut" test -n "$frames"
+    fact "what is lost of it is less than a frame" test $((all - after)) -lt $frame_bytes
+    fact "it has most of what was written before the cut" test "${frames:-0}" -ge 24
+    fact "all of these frames were replayed" test "$(grep -c . /run/torn/tracks.csv)" -gt 10
+    fact "the service runs" runs 30
+    fact "asked to record" ask
+    fact "it does" eventually is "$written" 1
+    fact "the service ends" end
+    journal
+    finish
+    ;;
+esac

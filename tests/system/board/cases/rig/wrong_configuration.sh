@@ -1,0 +1,59 @@
+#!/bin/bash
+# A wrong configuration: taken over while it runs it is refused, with its line in the journal, and the old one goes on;
+# at a start it is the reason, said once, and the service waits for a better one.
+# wants: packages/stereotrack packages/stereotrack-tools
+# limit: 300
+# shellcheck source=tests/system/board/guest/tap.sh
+source /payload/.board/tap.sh
+# shellcheck source=tests/system/board/guest/rig.sh
+source /payload/.board/rig.sh
+
+fact "the packages are installed" install_rig
+configure <<END
+[source]
+name = "synthetic:eleven"
+fps = 5.0
+[synthetic]
+frames = 30
+width = 160
+height = 120
+[latency]
+output_ms = 150.0
+late_ms = 20.0
+grace_ms = 20.0
+[telemetry]
+destinations = ["127.0.0.1:5701"]
+[[signal]]
+name = "there"
+line = "rig:NEAR"
+when = "confirmed"
+END
+sed 's/^when = .*/when = "confirmd"/' "$configuration" >/run/wrong.toml
+wrong_line=$(grep -n confirmd /run/wrong.toml | cut -d : -f 1)
+good=$(<"$configuration")
+started() { systemctl start stereotrackd; }
+
+fact "the service is ready" begin
+process=$(property MainPID)
+fact "a target makes its line active" eventually shows 2 1
+cp /run/wrong.toml "$configuration"
+fact "a wrong configuration is to be taken over" systemctl reload stereotrackd
+fact "it is refused, with file and line" eventually says "reload: refused, .*stereotrackd.toml:$wrong_line:[0-9]+: .*confirmd"
+fact "and counted" eventually is stereotrack_reloads_refused_total 1
+fact "the old one goes on" rises stereotrack_frames_total 10
+fact "all leave with their own results" all_left
+fact "its line, too" eventually shows 2 1
+fact "it is the process that was started" test "$(property MainPID)" = "$process"
+
+fact "it is restarted with it, in vain" sh -c '! systemctl restart stereotrackd'
+fact "which is told, with file and line" eventually says "^/etc/.*stereotrackd.toml:$wrong_line:[0-9]+: .*confirmd"
+sleep 5
+fact "it is not tried again and again" test "$(property ActiveState)" = failed
+fact "the line is safe" shows 2 0
+echo "$good" >"$configuration"
+fact "with a good one it starts" started
+fact "and tracks" runs 10
+fact "its line tells" eventually shows 2 1
+fact "the service ends" end
+journal
+finish
