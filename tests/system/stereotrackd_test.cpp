@@ -367,6 +367,51 @@ TEST(Stereotrackd, DrivesItsLinesSafeAfterACrash) {
   EXPECT_NE(done.err.find("/dev/nochip"), std::string::npos) << done.err;
 }
 
+TEST(Stereotrackd, AfterACrashItsLinesAreThoseThatItTookWhateverTheFileSaysSince) {
+  const TempDir folder;
+  const auto lines = [](const std::string& name, const std::string& safe) {
+    return "[[signal]]\nname = \"a\"\nline = \"sim:" + name + "\"\nwhen = \"confirmed\"\nsafe = \"" + safe + "\"\n";
+  };
+  const std::string config = small(folder.path(), lines("taken", "active"));
+  const fs::path taken = folder / "state" / "taken_lines.toml";
+  Program program({kDaemon, "--config", config});
+  ASSERT_TRUE(wait_for([&] { return has_started(program); })) << program.err_so_far();
+  EXPECT_TRUE(fs::exists(taken));
+  (void)kill(program.pid(), SIGKILL);
+  (void)program.wait();
+  (void)small(folder.path(), lines("other", "active"));
+  const ProgramResult changed = run_program({kDaemon, "--config", config, "--safe-lines"});
+  EXPECT_EQ(changed.exit_code, 0) << changed.err;
+  EXPECT_NE(changed.err.find("sim:taken: driven active"), std::string::npos) << changed.err;
+  EXPECT_NE(changed.err.find("sim:other: driven active"), std::string::npos) << changed.err;
+  EXPECT_FALSE(fs::exists(taken)) << "they are safe now";
+}
+
+TEST(Stereotrackd, AfterACrashAWrongFileDoesNotKeepTheLinesFromBeingSafe) {
+  const TempDir folder;
+  const std::string config =
+      small(folder.path(), "[[signal]]\nname = \"a\"\nline = \"sim:taken\"\nwhen = \"confirmed\"\n");
+  // As systemd gives it: a file that cannot be read says nothing of where the state is.
+  ASSERT_EQ(setenv("STATE_DIRECTORY", (folder / "state").c_str(), 1), 0);
+  Program program({kDaemon, "--config", config});
+  ASSERT_TRUE(wait_for([&] { return has_started(program); })) << program.err_so_far();
+  (void)kill(program.pid(), SIGKILL);
+  (void)program.wait();
+  (void)small(folder.path(), "[[signal]]\nname = \"a\"\n");
+  const ProgramResult wrong = run_program({kDaemon, "--config", config, "--safe-lines"});
+  (void)unsetenv("STATE_DIRECTORY");
+  EXPECT_EQ(wrong.exit_code, 0) << wrong.err;
+  EXPECT_NE(wrong.err.find("rig.toml:12:1: signal[1].line: it is missing"), std::string::npos) << wrong.err;
+  EXPECT_NE(wrong.err.find("sim:taken: driven inactive"), std::string::npos) << wrong.err;
+}
+
+TEST(Stereotrackd, ARunThatEndedInOrderLeavesNoLinesToBeMadeSafe) {
+  const TempDir folder;
+  const ProgramResult done = run_program({kDaemon, "--config", small(folder.path()), "--set", "source.repeat=once"});
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_FALSE(fs::exists(folder / "state" / "taken_lines.toml"));
+}
+
 TEST(Stereotrackd, StopsWhatAskedTheCamerasForExposuresAfterACrash) {
   const TempDir folder;
   const std::filesystem::path file = folder.path() / "rig.toml";

@@ -70,13 +70,13 @@ fact "what was seen of the lines is kept" watched
 for line in rig:NEAR rig:ZONE rig:HEALTH; do
   after=$(driven_after_ms $line)
   echo "$line: driven to its safe state $after ms after the kill" | tell
-  fact "$line was driven to its safe state soon after the kill" within "$after" 1000
+  fact "$line was driven to its safe state soon after the kill" within "$after" 1500
 done
 # Held by the next process: the unit's pause, and what that needs before it takes its lines.
 for line in 0 1 2; do
   after=$(held_after_ms $line)
   echo "line $line of these: held in its safe state by the next process $after ms after the kill" | tell
-  fact "line $line of these was held safe by the next process, before that drew its scene" within "$after" 4000
+  fact "line $line of these was held safe by the next process, before that drew its scene" within "$after" 6000
 done
 tail -n 60 /run/changes.txt | tell
 fact "what was heard is kept" heard

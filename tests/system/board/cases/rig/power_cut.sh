@@ -3,7 +3,7 @@
 # written is whole, the other one is there up to its last whole frame, and the service comes up by itself each time.
 # What it keeps lies on a disk with a journal; what the board had not flushed is lost.
 # wants: packages/stereotrack packages/stereotrack-tools
-# limit: 300
+# limit: 1200
 # power cuts: 2
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
