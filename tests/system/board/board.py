@@ -492,7 +492,9 @@ def command_test(args):
 
 
 def command_targets(args):
-    print(*sorted({pathlib.Path(want).name for case in cases_of(args.names) for want in case.wants}))
+    # All packages are one target.
+    print(*sorted({pathlib.Path(want).name if want.split("/")[0] != "packages" else "packages"
+                   for case in cases_of(args.names) for want in case.wants}))
     return 0
 
 
