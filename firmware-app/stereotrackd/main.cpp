@@ -261,9 +261,11 @@ int run(const Arguments& arguments) {
   }
   const fs::path state = state_directory(configuration);
   fs::create_directories(state);
+  const std::string& named = configuration.record.directory;
+  parts.recordings = named.empty() ? (state / "recordings").string() : named;
   if (configuration.record.on) {
-    fs::create_directories(configuration.record.directory);
-    for (const std::string& line : record::keep_torn(configuration.record.directory)) {
+    fs::create_directories(parts.recordings);
+    for (const std::string& line : record::keep_torn(parts.recordings)) {
       log(LogLevel::kNotice, "recording: " + line, {{"STEREOTRACK_CAUSE", "record"}});
     }
   }
