@@ -228,7 +228,7 @@ struct RecordConfig {
   double seconds_after = 2;  ///< and after it [s]
   int reduce = 1;            ///< pictures so many times smaller; over 1: luma alone, replays are not exact
   int every = 1;             ///< every n-th frame; over 1: replays are not exact
-  std::string directory = "/var/lib/stereotrack/recordings";
+  std::string directory;
   int max_mb = 2000;        ///< of all recordings in it [MB = 2^20 bytes]
   bool on_deadline = true;  ///< triggers
   bool on_zone = false;

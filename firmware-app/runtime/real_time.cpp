@@ -76,8 +76,9 @@ RealTimeProcess::RealTimeProcess(const Config& config) {
   latency_fd_ = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
   const std::int32_t most_us = 0;
   if (latency_fd_ < 0 || write(latency_fd_, &most_us, sizeof most_us) != sizeof most_us) {
-    missing_.push_back({"/dev/cpu_dma_latency: " + reason(errno) + ": cores may sleep deeply and wake late",
-                        "the udev rule that gives the device to the service's group, or realtime.deep_sleep = true"});
+    missing_.push_back(
+        {"/dev/cpu_dma_latency: " + reason(errno) + ": cores may sleep deeply and wake late",
+         "be in the group stereotrack, to which the package's udev rule gives it, or realtime.deep_sleep = true"});
   }
 }
 

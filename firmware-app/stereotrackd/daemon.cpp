@@ -48,12 +48,13 @@ runtime::OutputSchedule::Config schedule_config(const config::LatencyConfig& lat
   return schedule;
 }
 
-record::BlackBox::Config box_config(const config::RecordConfig& record, const config::LatencyConfig& latency) {
+record::BlackBox::Config box_config(const config::RecordConfig& record, const std::string& recordings,
+                                    const config::LatencyConfig& latency) {
   return {.seconds = record.seconds,
           .seconds_after = record.seconds_after,
           .reduce = record.reduce,
           .every = record.every,
-          .directory = record.directory,
+          .directory = record.directory.empty() ? recordings : record.directory,
           .max_bytes = static_cast<std::uint64_t>(record.max_mb) << 20U,
           .patience = 20 + static_cast<int>(config::from_ms(latency.output_ms) / kRecorderRound)};
 }
@@ -152,8 +153,8 @@ Daemon::Daemon(Parts parts)
     run.about.unit_m = parts.unit_m;
     if (parts.calibration != nullptr) run.calibration = *parts.calibration;
     run.configuration = config::to_text(configuration);
-    box_ = std::make_unique<record::BlackBox>(box_config(configuration.record, configuration.latency), std::move(run),
-                                              *pipeline_);
+    box_ = std::make_unique<record::BlackBox>(box_config(configuration.record, parts.recordings, configuration.latency),
+                                              std::move(run), *pipeline_);
     frames_->keep_in(box_.get());
     publisher_->keep_in(box_.get(), causes_of(configuration.record));
   }

@@ -48,6 +48,7 @@ class Daemon {
     gpio::OutputLines lines;
     Inputs inputs;
     std::uint64_t session = 0;
+    std::string recordings;                     ///< folder for them, where record.directory names none
     std::unique_ptr<telemetry::Signer> signer;  ///< null: nothing is signed
     StageObserver also;                         ///< told of each stage's end, in the frame loop
     std::size_t pool_slots = 4;

@@ -327,9 +327,11 @@ int run(const Arguments& arguments) {
     missing = process->missing();
     if (enforce && !missing.empty()) refuse(missing.front());
   }
+  const std::string& named = configuration.record.directory;
+  parts.recordings = named.empty() ? (state / "recordings").string() : named;
   if (configuration.record.on) {
-    fs::create_directories(configuration.record.directory);
-    for (const std::string& line : record::keep_torn(configuration.record.directory)) {
+    fs::create_directories(parts.recordings);
+    for (const std::string& line : record::keep_torn(parts.recordings)) {
       log(LogLevel::kNotice, "recording: " + line, {{"STEREOTRACK_CAUSE", "record"}});
     }
   }

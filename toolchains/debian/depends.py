@@ -47,7 +47,7 @@ def is_newer(one, other):
 
 
 def newest(versions):
-    return functools.reduce(lambda best, one: one if is_newer(one, best) else best, versions)
+    return functools.reduce(lambda best, one: one if is_newer(one, best) else best, sorted(set(versions)))
 
 
 class Library:

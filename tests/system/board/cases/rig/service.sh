@@ -65,7 +65,8 @@ edge_counts() {
     echo pull-down >/run/rig/sim_gpio1/pull && eventually over "$edges" "$before"
 }
 owned() { [[ $(stat -c %U:%G "$1") == "$2" ]]; }
-recorded() { find /var/lib/stereotrack/recordings -name '*.strec' -user stereotrack | grep .; }
+# FOLDER
+recorded() { find "$1/recordings" -name '*.strec' -user stereotrack | grep .; }
 # As root, in the unit's cgroup: which devices there are is not a question of the user.
 is_forbidden() {
   (echo "$BASHPID" >/sys/fs/cgroup/system.slice/stereotrackd.service/cgroup.procs && exec head -c 1 "$1") 2>&1 |
@@ -118,7 +119,7 @@ fact "edges are counted" edge_counts
 fact "datagrams come" stereotrack monitor --count 10 --timeout 20
 fact "figures are served" grep '^stereotrack_frames_total' <(curl -s http://127.0.0.1:9464/metrics)
 fact "it records when it is asked to" systemctl kill --signal=USR1 stereotrackd
-fact "into its state directory" eventually recorded
+fact "into its state directory" eventually recorded /var/lib/stereotrack
 fact "a disk is none of its devices" is_forbidden /dev/vda
 fact "the kernel's log neither" is_forbidden /dev/kmsg
 fact "the board finds it no more exposed than was promised" exposed_at_most stereotrackd.service 1.5
@@ -141,10 +142,17 @@ name = "synthetic:eleven"
 frames = 30
 width = 160
 height = 120
+[record]
+on = true
+seconds = 1.0
+seconds_after = 0.1
+on_deadline = false
 END
 fact "a second rig has a unit of its own" systemctl start stereotrackd@two
 fact "with a state of its own" owned /var/lib/stereotrack/two/session stereotrack:stereotrack
 fact "a runtime directory, too" owned /run/stereotrack-two stereotrack:stereotrack
+fact "it records" systemctl kill --signal=USR1 stereotrackd@two
+fact "into its own state" eventually recorded /var/lib/stereotrack/two
 
 one=$(main_pid $unit)
 two=$(main_pid stereotrackd@two)
