@@ -5,7 +5,8 @@ times and what names the machine.
     same_bytes.py --native STEREOTRACK --other STEREOTRACK [--only NAME] scenes|recordings EMULATOR [ARGUMENT...]
 
 An emulator draws a scene for long: it draws a few small pairs itself; of the rest this machine draws the pictures.
-Recordings are those of ../shared/data; without them exit 77.
+Recordings are those of ../shared/data that are pictures; without them exit 77. A video is not compared: FFmpeg's decoder gives
+other pixels on ARM (XVID: up to 3 grey levels), before any code of ours sees them.
 """
 import argparse
 import json
@@ -33,11 +34,9 @@ SCENES = {
 RECORDINGS = {
     "conveyor": ("dtu_conveyor_stereo", ["--calibration", "dtu_conveyor_stereo/derived_stereo_calibration.yml",
                                          "--frames", "96:112"], True),
-    "people": ("sbs:stereo_people_overhead/my_video_sbs_640x240.avi",
-               ["--calibration", "stereo_people_overhead/calibration_as_stored.yml", "--frames", "50:70"], True),
     "pitch": ("baseball_stereo_slow126/one_pitch", ["--calibration", "baseball_stereo_slow126/calibration.yml",
                                                     "--frames", "1:12"], True),
-    "highway": ("mono:cdnet_highway/input", ["--frames", "1:40"], True),
+    "highway": ("mono:cdnet_highway/input", ["--frames", "1:40"], False),
     "kitti": ("kitti_odom_sample/sequences/03", [], False),
     "euroc": ("euroc_micro/mav0", [], False),
 }
