@@ -470,7 +470,7 @@ void BlackBox::begin(const Frozen& frozen) {
   text(RecordKind::kConfiguration, run_.configuration);
   if (frozen.keyframe < 0) return;
   const Keyframe& keyframe = keyframes_[static_cast<std::size_t>(frozen.keyframe)];
-  const std::span<std::byte> payload = keyframe.memory.first(keyframe.bytes);
+  const std::span<std::byte> payload = keyframe.memory.first(static_cast<std::size_t>(keyframe.bytes));
   if (!seal_state(payload.subspan(sizeof(KeyframeMeta)))) throw std::runtime_error("black box: a keyframe is torn");
   if (!writer_.write(RecordKind::kKeyframe, payload)) throw std::runtime_error(writer_.status());
 }

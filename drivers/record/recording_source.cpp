@@ -70,8 +70,9 @@ bool RecordingSource::read_record(std::size_t& at, FileRecord& out) const noexce
   if (out.header.header_sum != checksum(header.first(offsetof(RecordHeader, header_sum)))) return false;
   const std::size_t payload = at + sizeof(RecordHeader);
   if (file_.size() - payload < out.header.bytes) return false;
-  out.payload = file_.subspan(payload, out.header.bytes);
-  at = payload + out.header.bytes;
+  const auto bytes = static_cast<std::size_t>(out.header.bytes);
+  out.payload = file_.subspan(payload, bytes);
+  at = payload + bytes;
   return true;
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Whole runs give the same bytes on another CPU as on this machine: tracks.csv, telemetry.bin, and of summary.json all but
-times and what names the machine.
+times and memory.
 
     same_bytes.py --native STEREOTRACK --other STEREOTRACK [--only NAME] scenes|recordings EMULATOR [ARGUMENT...]
 
@@ -19,7 +19,7 @@ import time
 DATA = pathlib.Path(__file__).resolve().parents[3] / "shared/data"
 SKIPPED = 77
 # Of summary.json: what two machines may differ in.
-OF_THE_MACHINE = ["stages_ms"]
+OF_THE_MACHINE = ["stages_ms", "memory_bytes"]  # pointers have 32 bits or 64
 # NAME: (source, options, whether tracks must come of it)
 SCENES = {
     "drawn_robust": ("synthetic:eleven", ["--set", "preset=robust", "--frames", "1:3", "--set", "synthetic.width=160",
