@@ -127,7 +127,7 @@ BlackBox::BlackBox(Config config, Run run, const Pipeline& pipeline)
   // Asked for more than there is, Linux would give it and end the program once it is touched.
   const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   const std::uint64_t most = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) / 4 * 3 * page;
-  const bool fits = slots_ <= most / slot_bytes_;
+  const bool fits = slots_ <= std::min<std::uint64_t>(most, SIZE_MAX) / slot_bytes_;  // a 32-bit system may have 8 GB
   if (fits) memory_ = arena_.array<std::byte>(static_cast<std::size_t>(slots_) * slot_bytes_);
   if (config_.reduce > 1) scratch_ = arena_.array<std::byte>(views * raw_bytes_);
   if (is_exact()) {
@@ -468,7 +468,7 @@ void BlackBox::begin(const Frozen& frozen) {
   text(RecordKind::kConfiguration, run_.configuration);
   if (frozen.keyframe < 0) return;
   const Keyframe& keyframe = keyframes_[static_cast<std::size_t>(frozen.keyframe)];
-  const std::span<std::byte> payload = keyframe.memory.first(keyframe.bytes);
+  const std::span<std::byte> payload = keyframe.memory.first(static_cast<std::size_t>(keyframe.bytes));
   if (!seal_state(payload.subspan(sizeof(KeyframeMeta)))) throw std::runtime_error("black box: a keyframe is torn");
   if (!writer_.write(RecordKind::kKeyframe, payload)) throw std::runtime_error(writer_.status());
 }

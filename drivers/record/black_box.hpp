@@ -148,7 +148,7 @@ class BlackBox {
   };
 
   [[nodiscard]] std::span<std::byte> slot(std::uint64_t frame) const noexcept {
-    return memory_.subspan(frame % slots_ * slot_bytes_, slot_bytes_);
+    return memory_.subspan(static_cast<std::size_t>(frame % slots_) * slot_bytes_, slot_bytes_);
   }
   [[nodiscard]] bool is_free(std::uint64_t frame) noexcept;
   void break_row() noexcept;

@@ -35,9 +35,14 @@ std::span<const std::byte> map_file(const std::string& path) {
   if (file < 0) throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno) + "; check the path");
   struct stat state {};
   const bool known = ::fstat(file, &state) == 0 && S_ISREG(state.st_mode);
-  const auto size = known ? static_cast<std::size_t>(state.st_size) : 0;
-  void* memory = size < sizeof(FileHeader) ? MAP_FAILED : ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
+  const auto bytes = known ? static_cast<std::uint64_t>(state.st_size) : 0;
+  const auto size = static_cast<std::size_t>(bytes);  // of 32 bits on ARMv7
+  void* memory =
+      size != bytes || bytes < sizeof(FileHeader) ? MAP_FAILED : ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
   ::close(file);
+  if (memory == MAP_FAILED && bytes >= sizeof(FileHeader)) {
+    throw std::runtime_error(path + ": larger than a program can address here; replay it on a 64-bit machine");
+  }
   if (memory == MAP_FAILED) throw std::runtime_error(path + ": " + kNotOurs + "; give a .strec file of this program");
   return {static_cast<const std::byte*>(memory), size};
 }
@@ -65,8 +70,9 @@ bool RecordingSource::read_record(std::size_t& at, FileRecord& out) const noexce
   if (out.header.header_sum != checksum(header.first(offsetof(RecordHeader, header_sum)))) return false;
   const std::size_t payload = at + sizeof(RecordHeader);
   if (file_.size() - payload < out.header.bytes) return false;
-  out.payload = file_.subspan(payload, out.header.bytes);
-  at = payload + out.header.bytes;
+  const auto bytes = static_cast<std::size_t>(out.header.bytes);
+  out.payload = file_.subspan(payload, bytes);
+  at = payload + bytes;
   return true;
 }
 

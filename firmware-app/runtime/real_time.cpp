@@ -123,8 +123,8 @@ bool Thread::join_for(std::chrono::milliseconds limit) noexcept {
   }
   timespec until{};
   (void)clock_gettime(CLOCK_REALTIME, &until);  // the clock that pthread_timedjoin_np knows
-  until.tv_sec += limit.count() / 1000;
-  until.tv_nsec += limit.count() % 1000 * 1'000'000;
+  until.tv_sec += static_cast<time_t>(limit.count() / 1000);
+  until.tv_nsec += static_cast<long>(limit.count() % 1000 * 1'000'000);
   if (until.tv_nsec >= 1'000'000'000) {
     ++until.tv_sec;
     until.tv_nsec -= 1'000'000'000;

@@ -37,7 +37,7 @@ void Interrupts::wait(int fd, std::chrono::nanoseconds longest) const {
   pthread_sigmask(SIG_BLOCK, &blocked, &before);
   if (!asked()) {
     const std::int64_t ns = std::max(longest.count(), std::int64_t{0});
-    const timespec time{ns / 1'000'000'000, ns % 1'000'000'000};
+    const timespec time{static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};
     pollfd poll{fd, POLLIN, 0};
     (void)ppoll(&poll, 1, &time, &before);
   }

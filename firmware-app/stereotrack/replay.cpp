@@ -78,7 +78,9 @@ class Pacer {
 std::vector<telemetry::Endpoint> destinations_of(const config::Configuration& configuration) {
   std::vector<telemetry::Endpoint> destinations = telemetry::parse_endpoints(configuration.telemetry.destinations);
   if (destinations.empty()) {
-    destinations.push_back(telemetry::parse_endpoint("127.0.0.1:" + std::to_string(telemetry::kDefaultPort)));
+    std::string loopback = "127.0.0.1:";
+    loopback += std::to_string(telemetry::kDefaultPort);
+    destinations.push_back(telemetry::parse_endpoint(loopback));
   }
   return destinations;
 }

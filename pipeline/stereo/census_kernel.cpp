@@ -112,7 +112,7 @@ using PixelBytes = hn::CappedTag<std::uint8_t, static_cast<std::size_t>(2 * kLan
 
 /// Codes lie in planes of bytes. Where bits of bytes can be counted, a byte holds 8 of them; else 4, whose distance
 /// from four others is looked up.
-#if HWY_TARGET == HWY_AVX3_DL || HWY_TARGET == HWY_NEON
+#if HWY_TARGET == HWY_AVX3_DL || HWY_ARCH_ARM
 constexpr int kPlanes = 3;
 #else
 constexpr int kPlanes = 6;

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Whole runs give the same bytes on another CPU as on this machine: tracks.csv, telemetry.bin, and of summary.json all but
-times and what names the machine.
+times and memory.
 
     same_bytes.py --native STEREOTRACK --other STEREOTRACK [--only NAME] scenes|recordings EMULATOR [ARGUMENT...]
 
 An emulator draws a scene for long: it draws a few small pairs itself; of the rest this machine draws the pictures.
-Recordings are those of ../shared/data; without them exit 77.
+Recordings are those of ../shared/data that are pictures; without them exit 77. A video is not compared: FFmpeg's decoder gives
+other pixels on ARM (XVID: up to 3 grey levels), before any code of ours sees them.
 """
 import argparse
 import json
@@ -18,7 +19,7 @@ import time
 DATA = pathlib.Path(__file__).resolve().parents[3] / "shared/data"
 SKIPPED = 77
 # Of summary.json: what two machines may differ in.
-OF_THE_MACHINE = ["stages_ms"]
+OF_THE_MACHINE = ["stages_ms", "memory_bytes"]  # pointers have 32 bits or 64
 # NAME: (source, options, whether tracks must come of it)
 SCENES = {
     "drawn_robust": ("synthetic:eleven", ["--set", "preset=robust", "--frames", "1:3", "--set", "synthetic.width=160",
@@ -33,11 +34,9 @@ SCENES = {
 RECORDINGS = {
     "conveyor": ("dtu_conveyor_stereo", ["--calibration", "dtu_conveyor_stereo/derived_stereo_calibration.yml",
                                          "--frames", "96:112"], True),
-    "people": ("sbs:stereo_people_overhead/my_video_sbs_640x240.avi",
-               ["--calibration", "stereo_people_overhead/calibration_as_stored.yml", "--frames", "50:70"], True),
     "pitch": ("baseball_stereo_slow126/one_pitch", ["--calibration", "baseball_stereo_slow126/calibration.yml",
                                                     "--frames", "1:12"], True),
-    "highway": ("mono:cdnet_highway/input", ["--frames", "1:40"], True),
+    "highway": ("mono:cdnet_highway/input", ["--frames", "1:40"], False),
     "kitti": ("kitti_odom_sample/sequences/03", [], False),
     "euroc": ("euroc_micro/mav0", [], False),
 }

@@ -126,6 +126,9 @@ std::string pnm_damage(Bytes b) {
   return {};
 }
 
+// A size of 32 bits holds it, as a stream's and a vector's are there.
+constexpr std::streamoff kMostBytes = std::streamoff{1} << 30;
+
 cv::Mat high_byte(const cv::Mat& wide) {
   cv::Mat narrow(wide.size(), CV_MAKETYPE(CV_8U, wide.channels()));
   for (int y = 0; y < wide.rows; ++y) {
@@ -159,9 +162,10 @@ tl::expected<cv::Mat, std::string> read_picture(const std::filesystem::path& pat
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = in ? static_cast<std::streamoff>(in.tellg()) : -1;
   if (size < 0) return fault("cannot be read");
+  if (size > kMostBytes) return fault("larger than 1 GiB");
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(size));
   in.seekg(0);
-  in.read(reinterpret_cast<char*>(bytes.data()), size);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
   if (!in) return fault("cannot be read");
 
   const std::string what = damage(bytes);

@@ -19,7 +19,8 @@ namespace stereotrack::capture {
 [[nodiscard]] std::string damage(std::span<const std::uint8_t> bytes);
 
 /// The decoded picture, CV_8UC1 or CV_8UC3 (BGR): alpha dropped, high byte of 16 bits, EXIF rotation not applied;
-/// or one line that names the file and what is wrong. May be called by several threads at once.
+/// or one line that names the file and what is wrong; over 1 GiB none is read. May be called by several threads at
+/// once.
 [[nodiscard]] tl::expected<cv::Mat, std::string> read_picture(const std::filesystem::path& path);
 
 }  // namespace stereotrack::capture

@@ -145,7 +145,7 @@ class Player {
   [[nodiscard]] FramePair pair_of(std::uint64_t n) const {
     const std::uint64_t last = drawn_.size() - 1;
     const std::uint64_t round = last > 0 ? n % (2 * last) : 0;
-    const Drawn& drawn = drawn_[round <= last ? round : 2 * last - round];
+    const Drawn& drawn = drawn_[static_cast<std::size_t>(round <= last ? round : 2 * last - round)];
     FramePair pair;
     pair.ordinal = n + 1;
     pair.capture_time = CaptureTime(info_.period * static_cast<std::int64_t>(n + 1));

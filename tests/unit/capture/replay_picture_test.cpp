@@ -1,4 +1,5 @@
 #include <cstring>
+#include <fstream>
 #include <random>
 
 #include "drivers/capture/replay/picture_file.hpp"
@@ -109,6 +110,16 @@ TEST(ReadPicture, MissingFileAndFolderAreFaults) {
   EXPECT_THAT(read_picture(dir / "a.png").error(), HasSubstr("a.png: missing"));
   std::filesystem::create_directory(dir / "b.png");
   EXPECT_THAT(read_picture(dir / "b.png").error(), HasSubstr("b.png: not a file"));
+}
+
+// One whose size has its low 32 bits clear, too: what a machine of 32 bits would take for empty.
+TEST(ReadPicture, HugeFilesAreFaultsAndNotRead) {
+  const test::TempDir dir;
+  for (const std::uintmax_t size : {(std::uintmax_t{1} << 30) + 1, std::uintmax_t{1} << 32}) {
+    std::ofstream(dir / "a.png") << "P5 1 1 255 x";
+    std::filesystem::resize_file(dir / "a.png", size);
+    EXPECT_THAT(read_picture(dir / "a.png").error(), HasSubstr("a.png: larger than 1 GiB")) << size;
+  }
 }
 
 TEST(ReadPicture, TextIsAFault) {

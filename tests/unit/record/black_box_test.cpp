@@ -508,6 +508,20 @@ TEST(BlackBox, MoreMemoryThanThereIsIsOneLine) {
   EXPECT_THROW(Rig(robust(), folder.path(), config), std::runtime_error);
 }
 
+// A system of 32 bits may have more memory than a program of it can address.
+#if SIZE_MAX == UINT32_MAX
+TEST(BlackBox, MoreMemoryThanAProgramCanAddressIsOneLine) {
+  const TempDir folder;
+  const auto pair_bytes =
+      static_cast<double>(2 * picture_bytes(robust().format->format, MovingScene::kWidth, MovingScene::kHeight));
+  for (const double times : {1.05, 1.2, 1.5}) {
+    BlackBox::Config config;
+    config.seconds = times * 0x1p32 / pair_bytes / kFramesASecond;
+    EXPECT_THROW(Rig(robust(), folder.path(), config), std::runtime_error) << times;
+  }
+}
+#endif
+
 // Frame loop and service thread as they are in the daemon: for the sanitizers, and for torn frames.
 TEST(BlackBox, TwoThreadsGiveWholeRecordings) {
   const TempDir folder;

@@ -199,6 +199,23 @@ TEST(Recording, WhatIsNoneIsRefusedWithOneLine) {
   EXPECT_THROW(RecordingSource(folder.write("b.strec", std::string(10000, 'x')).string()), std::runtime_error);
 }
 
+// Larger than 32 bits tell, by as much as a small recording has: there it must not be taken for that.
+TEST(Recording, WhatIsTooLargeToBeAddressedIsRefusedWithOneLine) {
+  const TempDir folder;
+  const fs::path path = folder / "x.strec";
+  write_recording(path);
+  const std::uintmax_t whole = fs::file_size(path);
+  fs::resize_file(path, (std::uintmax_t{1} << 32) + whole);
+  try {
+    RecordingSource source(path.string());
+    EXPECT_GT(sizeof(std::size_t), 4U);
+    EXPECT_EQ(frames_of(source), 4);
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(sizeof(std::size_t), 4U);
+    EXPECT_EQ(error.what(), path.string() + ": larger than a program can address here; replay it on a 64-bit machine");
+  }
+}
+
 TEST(RecordingWriter, AFileIsThereOnlyWhenItIsWhole) {
   const TempDir folder;
   {
