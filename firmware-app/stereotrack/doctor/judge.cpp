@@ -50,7 +50,7 @@ class Judge {
     const KernelFacts& k = f_.kernel;
     const std::string what = joined({k.release, k.architecture}, " ");
     switch (k.preemption) {
-      case Preemption::kRealTime:
+      case Preemption::kRealTime: ok("kernel", what + ", PREEMPT_RT"); return;
       case Preemption::kFull: ok("kernel", what + ", preemption " + to_string(k.preemption)); return;
       case Preemption::kUnknown:
         ok("kernel", what + ", preemption as it was started with: only root may read /sys/kernel/debug/sched/preempt");

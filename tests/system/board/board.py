@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The emulated board: 64-bit ARM, Debian 12, two cameras of the kernel's own (vivid), and more: guest/devices.
+"""The emulated board: 64-bit ARM, Debian 12, or Debian 13 with a PREEMPT_RT kernel, two cameras of the kernel's own (vivid),
+and more: guest/devices.
 
     board.py make                                      image and saved state, where they do not fit the scripts
     board.py run [OPTIONS] PROGRAM [ARGUMENT...]       a program (or script) of the host on a fresh board, as root in
@@ -8,21 +9,23 @@
       --results FOLDER               what the program left in /run/results
       --time-limit SECONDS           of the board's clock (60): then it says what hangs, exit code 124
       --clock steady|real            default steady
+      --board debian12|debian13      of make, run, test and targets; default debian12
   board.py test [--build FOLDER] [--junit FILE] [GROUP|GROUP/CASE]...
                                                        the cases (all), each on a fresh board; exit code 1 where one
-                                                       fails or there is none; what they left: build/board-results;
-                                                       at the end: how long each took
+                                                       fails or there is none; what they left:
+                                                       build/board-results/NAME; at the end: how long each took
       --jobs N                       boards at a time: one a core (4 at most), with the real clock one
   board.py targets [GROUP|GROUP/CASE]...               the CMake targets that the cases want
 
 A case is cases/GROUP/CASE.sh. It prints TAP (guest/tap.sh) and says in its head, in comments: "# wants: bin/PROGRAM ..."
 what it wants of the build folder (packages/NAME: the .deb of that name), "# brings: PATH ..." what of the project's files
 the programs read (they find them where they were when they were built), "# limit: SECONDS" of the board's clock (120),
+"# boards: NAME ..." where it runs (all), "# wants on NAME: ..." what it wants only there,
 "# power cuts: N" how often it asks for one (0): the emulator is killed, the board boots anew with the disks as they are,
 and the case is called again, its first argument the number of cuts so far.
 
-Everything lies in build/board, or where STEREOTRACK_BOARD_CACHE says. The board is booted once and its state is saved;
-each run starts from there, in seconds, on disks that forget. No board outlives board.py.
+Everything lies in build/board/NAME, or NAME in the folder STEREOTRACK_BOARD_CACHE. The board is booted once and its state
+is saved; each run starts from there, in seconds, on disks that forget. No board outlives board.py.
 
 Clocks. steady: time is the count of instructions, two nanoseconds each on one host thread, and idle time is skipped: 40 ms
 between frames are 40 ms however busy the host is. What waits for a disk sees time leap: read files before it counts.
@@ -48,16 +51,20 @@ import sys
 import tarfile
 import tempfile
 import time
+import typing
 import xml.etree.ElementTree as xml
 
 HERE = pathlib.Path(__file__).resolve().parent
 PROJECT = HERE.parents[2]
 CACHE = pathlib.Path(os.environ.get("STEREOTRACK_BOARD_CACHE") or PROJECT / "build/board").resolve()
 CLOCKS = {"steady": ["-accel", "tcg,thread=single", "-icount", "shift=1,sleep=off"], "real": ["-accel", "tcg,thread=multi"]}
+# Name -> Debian's name of the release, and the preset of the programs for it.
+BOARDS = {"debian12": ("bookworm", "aarch64"), "debian13": ("trixie", "aarch64-debian13")}
 # The saved state knows the size of the disk that it will find.
 PAYLOAD_SIZE = 2 << 30
 DATA_SIZE = 512 << 20
-BOOT_LIMIT_S = 300
+# Ten seconds on a quiet host.
+BOOT_LIMIT_S = 900
 # Of the host, beyond the time limit of the board's clock: an emulator on a busy host.
 HOST_FACTOR = 10
 HUNG = 124
@@ -76,6 +83,16 @@ class UsageError(BoardError):
     """The same, of what was asked for."""
 
 
+class Board(typing.NamedTuple):
+    """Which board, and by which clock it runs."""
+    name: str
+    clock: str
+
+    @property
+    def folder(self):
+        return CACHE / self.name
+
+
 def note(text):
     print(f"board: {text}", file=sys.stderr, flush=True)
 
@@ -86,16 +103,16 @@ def die_with_parent():
     LIBC.prctl(pr_set_pdeathsig, signal.SIGKILL)
 
 
-def machine_options(clock, folder, disk, forgetful, kernel_words=""):
+def machine_options(board, folder, disk, forgetful, kernel_words=""):
     """Of the emulator: a board with its files in `folder`. forgetful: what it writes to `disk` is not kept. Of raw disks,
     as the data disk is, what the board has written outlives the emulator, however that ends: the host has it. So there is
     nothing to wait for, which would make time leap."""
     disk_kind = "format=raw,cache=unsafe" if pathlib.Path(disk).suffix == ".raw" else "format=qcow2"
     return [
-        "-M", "virt", "-cpu", "cortex-a72", *CLOCKS[clock], "-smp", "2", "-m", "1024",
+        "-M", "virt", "-cpu", "cortex-a72", *CLOCKS[board.clock], "-smp", "2", "-m", "1024",
         "-nodefaults", "-nographic", "-no-reboot", "-monitor", "none", "-serial", f"file:{folder}/console.log",
         "-qmp", f"unix:{folder}/qmp,server=on,wait=off",
-        "-kernel", str(CACHE / "vmlinuz"), "-initrd", str(CACHE / "initrd.gz"),
+        "-kernel", str(board.folder / "vmlinuz"), "-initrd", str(board.folder / "initrd.gz"),
         "-append", f"console=ttyAMA0 loglevel=4 panic=1 systemd.show_status=0 {kernel_words}".rstrip(),
         "-drive", f"file={disk},if=none,id=root,{disk_kind}" + (",snapshot=on" if forgetful else ""),
         "-device", "virtio-blk-pci,drive=root",
@@ -176,18 +193,18 @@ class Machine:
                     time.sleep(0.1)
 
 
-def make(clock):
+def make(board):
     """Image and saved state; (disk, state) to start from."""
-    CACHE.mkdir(parents=True, exist_ok=True)
+    board.folder.mkdir(parents=True, exist_ok=True)
     # One maker at a time. The lock goes with its file object.
-    with open(CACHE / "saved.lock", "w") as lock:
+    with open(board.folder / "saved.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        return make_alone(clock)
+        return make_alone(board)
 
 
-def sweep():
+def sweep(cache):
     """Removes what runs left that were killed. Who is alive has a lock on its folder, or made it just now."""
-    for folder in [*CACHE.glob("run-*"), *CACHE.glob("saving-*")]:
+    for folder in [*cache.glob("run-*"), *cache.glob("saving-*")]:
         try:
             if time.time() - folder.stat().st_mtime > 60:
                 with locked(folder, fcntl.LOCK_NB):
@@ -206,28 +223,29 @@ def locked(folder, how=0):
         os.close(handle)
 
 
-def make_alone(clock):
-    sweep()
-    subprocess.run([HERE / "make_image.sh", CACHE], check=True, stdout=sys.stderr)
+def make_alone(board):
+    cache, clock = board.folder, board.clock
+    sweep(cache)
+    subprocess.run([HERE / "make_image.sh", cache, BOARDS[board.name][0]], check=True, stdout=sys.stderr)
     version = subprocess.run(["qemu-system-aarch64", "--version"], check=True, capture_output=True, text=True).stdout
-    key = " ".join([(CACHE / "id").read_text(), version, *map(str, machine_options(clock, "", "", True)), str(PAYLOAD_SIZE),
+    key = " ".join([(cache / "id").read_text(), version, *map(str, machine_options(board, "", "", True)), str(PAYLOAD_SIZE),
                     str(DATA_SIZE)])
-    folder = CACHE / f"saved-{clock}-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+    folder = cache / f"saved-{clock}-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     disk, state = folder / "disk.qcow2", folder / "state"
     if folder.exists():
         return disk, state
-    note(f"booting once, clock {clock}, to save the state")
-    work = pathlib.Path(tempfile.mkdtemp(dir=CACHE, prefix="saving-"))
+    note(f"booting {board.name} once, clock {clock}, to save the state")
+    work = pathlib.Path(tempfile.mkdtemp(dir=cache, prefix="saving-"))
     try:
         begin = time.monotonic()
         # A name of its own: an image made anew does not pull the disk away from under a saved state.
-        os.link(CACHE / "root.ext4", work / "root.ext4")
+        os.link(cache / "root.ext4", work / "root.ext4")
         subprocess.run(["qemu-img", "create", "-q", "-f", "qcow2", "-b", "root.ext4", "-F", "raw", work / "disk.qcow2"],
                        check=True)
         for name, size in (("payload.ext4", PAYLOAD_SIZE), ("data.ext4", DATA_SIZE)):
             (work / name).touch()
             os.truncate(work / name, size)
-        with Machine(work, machine_options(clock, work, work / "disk.qcow2", False)) as machine:
+        with Machine(work, machine_options(board, work, work / "disk.qcow2", False)) as machine:
             try:
                 for line in machine.lines(begin + BOOT_LIMIT_S):
                     note(line.removeprefix("board: "))
@@ -241,7 +259,7 @@ def make_alone(clock):
             machine.save(work / "state")
         for name in ("payload.ext4", "data.ext4", "files.tar", "qmp"):
             (work / name).unlink(missing_ok=True)
-        for old in CACHE.glob(f"saved-{clock}-*"):
+        for old in cache.glob(f"saved-{clock}-*"):
             shutil.rmtree(old)
         work.rename(folder)
         note(f"state saved after {time.monotonic() - begin:.0f} s")
@@ -281,25 +299,25 @@ def make_disks(work, things, start):
     make_disk(work / "data.ext4", DATA_SIZE, "-E", "lazy_itable_init=0,lazy_journal_init=0")
 
 
-def run(clock, things, start, time_limit, results, hear, cuts=0):
+def run(board, things, start, time_limit, results, hear, cuts=0):
     """Runs the script `start` on a board with the things (name in /payload -> path here). hear(line) is told each line
     of its output. Its exit code, and how long it took by the board's clock [s]. It may ask for so many power cuts.
     Raises BoardError where no exit code comes."""
-    disk, state = make(clock)
-    with tempfile.TemporaryDirectory(dir=CACHE, prefix="run-") as name, locked(name):
+    disk, state = make(board)
+    with tempfile.TemporaryDirectory(dir=board.folder, prefix="run-") as name, locked(name):
         work = pathlib.Path(name)
         make_disks(work, things, start)
         if cuts > 0:
             own = work / "disk.raw"
             subprocess.run(["qemu-img", "convert", "-O", "raw", disk, own], check=True)
             disk = own
-        options = machine_options(clock, work, disk, cuts == 0)
+        options = machine_options(board, work, disk, cuts == 0)
         code, took, facts = run_once(work, [*options, "-incoming", f"exec:cat {shlex.quote(str(state))}"], hear,
                                      30 + HOST_FACTOR * time_limit)
         for cut in range(1, cuts + 1):
             if code is not None:
                 break
-            options = machine_options(clock, work, disk, False, f"board.cuts={cut} board.facts={facts}")
+            options = machine_options(board, work, disk, False, f"board.cuts={cut} board.facts={facts}")
             code, more, facts = run_once(work, options, hear, BOOT_LIMIT_S + HOST_FACTOR * time_limit, boots=True)
             took += more
         if code is None:
@@ -347,18 +365,23 @@ def command_run(args):
         things[pathlib.Path(path).name] = path
     command = shlex.join([f"./{program.name}", *args.arguments])
     start = f"limited {args.time_limit} {shlex.quote(program.name)} {command}"
-    return run(args.clock, things, start, args.time_limit, args.results, lambda line: print(line, flush=True))[0]
+    return run(Board(args.board, args.clock), things, start, args.time_limit, args.results, lambda line: print(line, flush=True))[0]
 
 
 class Case:
     """One script of cases/: what it wants, and what it said."""
 
-    def __init__(self, path):
+    def __init__(self, path, board="debian12"):
         self.path = path
         self.name = f"{path.parent.name}/{path.stem}"
         head = path.read_text()
-        self.wants, self.brings = ([name for line in re.findall(rf"^# {word}: (.*)$", head, re.M) for name in line.split()]
-                                   for word in ("wants", "brings"))
+        self.wants, there, self.brings, boards = (
+            [name for line in re.findall(rf"^# {word}: (.*)$", head, re.M) for name in line.split()]
+            for word in ("wants", f"wants on {board}", "brings", "boards"))
+        self.wants += there
+        if unknown := set(boards) - set(BOARDS):
+            raise BoardError(f"{path}: no such board: {', '.join(sorted(unknown))}")
+        self.boards = boards or list(BOARDS)
         self.limit, self.cuts = (int((re.findall(rf"^# {word}: (\d+)$", head, re.M) or [default])[0])
                                  for word, default in (("limit", 120), ("power cuts", 0)))
         self.facts = []  # (name, "ok" | "not ok" | "skip", text)
@@ -394,13 +417,18 @@ class Case:
             self.fail(f"has {self.plan} facts as it says, not {len(self.facts)}")
 
 
-def cases_of(names):
-    found = [Case(path) for path in sorted((HERE / "cases").glob("*/*.sh"))]
+def cases_of(names, board="debian12"):
+    """Those of the names, all without any, which run on that board."""
+    found = [Case(path, board) for path in sorted((HERE / "cases").glob("*/*.sh"))]
     groups = {case.path.parent.name for case in found}
     for name in names:
         if name not in groups and name not in {case.name for case in found}:
             raise UsageError(f"no such group or case: {name}; groups are {', '.join(sorted(groups))}")
-    return [case for case in found if not names or case.name in names or case.path.parent.name in names]
+    chosen = [case for case in found
+              if board in case.boards and (not names or case.name in names or case.path.parent.name in names)]
+    if not chosen:
+        raise UsageError(f"none of {', '.join(names)} runs on {board}")
+    return chosen
 
 
 def write_junit(cases, path):
@@ -436,7 +464,7 @@ def target_of(want):
 
 
 def run_case(case, args, results):
-    build = pathlib.Path(args.build)
+    build = pathlib.Path(args.build or PROJECT / "build" / BOARDS[args.board][1])
     things = {"case.sh": case.path, **{f".board/{name}.sh": HERE / f"guest/{name}.sh" for name in ("tap", "daemon", "rig")}}
     for want in case.wants:
         path = wanted(build, want)
@@ -447,8 +475,8 @@ def run_case(case, args, results):
              f"FACTS=$(kernel_word board.facts) limited {case.limit} {case.name} bash case.sh \"$(kernel_word board.cuts)\"")
     begin = time.monotonic()
     try:
-        code, case.board_seconds = run(args.clock, things, start, case.limit, results / case.name, case.hear,
-                                       case.cuts)
+        code, case.board_seconds = run(Board(args.board, args.clock), things, start, case.limit, results / case.name,
+                                       case.hear, case.cuts)
         case.finish(code)
     except BoardError as error:
         case.comments += str(error).splitlines()
@@ -475,8 +503,8 @@ def run_side_by_side(cases, jobs, run_one):
 
 
 def command_test(args):
-    cases = cases_of(args.names)
-    results = PROJECT / "build/board-results"
+    cases = cases_of(args.names, args.board)
+    results = PROJECT / "build/board-results" / args.board
     shutil.rmtree(results, ignore_errors=True)
     jobs = args.jobs or (1 if args.clock == "real" else min(os.cpu_count() or 1, MOST_JOBS))
     begin = time.monotonic()
@@ -489,7 +517,7 @@ def command_test(args):
     write_junit(cases, args.junit)
     for case in cases:
         print(f"{case.name:<24} {case.seconds:6.0f} s, {case.board_seconds:4d} s of the board's clock")
-    print(f"{'all cases':<24} {time.monotonic() - begin:6.0f} s")
+    print(f"{f'all cases, {args.board}':<24} {time.monotonic() - begin:6.0f} s")
     for case in cases:
         for name, kind, _ in case.facts:
             if kind == "not ok":
@@ -499,14 +527,16 @@ def command_test(args):
 
 
 def command_targets(args):
-    print(*sorted({target_of(want) for case in cases_of(args.names) for want in case.wants}))
+    print(*sorted({target_of(want) for case in cases_of(args.names, args.board) for want in case.wants}))
     return 0
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
-    with_clock = argparse.ArgumentParser(add_help=False)
+    with_board = argparse.ArgumentParser(add_help=False)
+    with_board.add_argument("--board", choices=BOARDS, default="debian12")
+    with_clock = argparse.ArgumentParser(add_help=False, parents=[with_board])
     with_clock.add_argument("--clock", choices=CLOCKS, default="steady")
     commands.add_parser("make", parents=[with_clock])
     one = commands.add_parser("run", parents=[with_clock])
@@ -518,16 +548,16 @@ def main():
     several = argparse.ArgumentParser(add_help=False)
     several.add_argument("names", nargs="*", metavar="GROUP|GROUP/CASE")
     test = commands.add_parser("test", parents=[with_clock, several])
-    test.add_argument("--build", default=PROJECT / "build/aarch64", metavar="FOLDER")
+    test.add_argument("--build", metavar="FOLDER")
     test.add_argument("--jobs", type=int, default=0, metavar="N")
     test.add_argument("--junit", default=PROJECT / "build/board.xml", metavar="FILE")
-    commands.add_parser("targets", parents=[several])
+    commands.add_parser("targets", parents=[with_board, several])
     args = parser.parse_args()
     # A finally of ours ends the emulator.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
         if args.command == "make":
-            make(args.clock)
+            make(Board(args.board, args.clock))
             return 0
         return {"run": command_run, "test": command_test, "targets": command_targets}[args.command](args)
     except BoardError as error:

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The board: Debian's own kernel and packages for arm64, unpacked only.
+# The board: Debian's own kernel and packages for arm64, unpacked only; Debian 13 (trixie) has the kernel with PREEMPT_RT.
 #     FOLDER/vmlinuz     Debian's kernel
 #     FOLDER/initrd.gz   loads the modules of the disk and goes on with it
 #     FOLDER/root.ext4   Debian with systemd, udev, v4l-utils, gpiod, libcamera, our programs' libraries, modules; apt
@@ -8,7 +8,7 @@
 # Packages come from this machine's mirrors (toolchains/debian_packages.sh). Each part carries a stamp of what it is made
 # of; what is there and fits is kept. Remove FOLDER to have newer packages.
 #
-#     tests/system/board/make_image.sh FOLDER
+#     tests/system/board/make_image.sh FOLDER {bookworm|trixie}
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=toolchains/debian_packages.sh
@@ -18,17 +18,24 @@ packages=(base-files base-passwd bash dash coreutils util-linux bsdutils mount s
   hostname login libc-bin ncurses-bin perl-base usr-is-merged dpkg apt debconf init-system-helpers libpam-modules
   libpam-runtime systemd systemd-sysv udev kmod dbus procps iproute2 strace
   v4l-utils gpiod libcamera-tools libcamera-ipa curl
-  # What our programs are linked with.
-  libgpiod2 libstdc++6 libhwy1 libsodium23 libsystemd0 libyaml-cpp0.7 libcpp-httplib0.11
-  libopencv-core406 libopencv-imgproc406 libopencv-calib3d406 libopencv-imgcodecs406 libopencv-videoio406)
-modules=(virtio_console virtio_rng virtio_net configfs vivid loop irq_sim gpio-sim v4l2loopback vimc)
+  # Cases read JSON by it.
+  perl)
+# What our programs are linked with.
+packages+=(libstdc++6 libsodium23 libsystemd0)
+case $#-${2:-} in
+  2-bookworm) opencv=406 packages+=(libgpiod2 libhwy1 libyaml-cpp0.7 libcpp-httplib0.11) ;;
+  2-trixie) opencv=410 packages+=(libgpiod3 libhwy1t64 libyaml-cpp0.8 libcpp-httplib0.18) ;;
+  *)
+    echo "usage: make_image.sh FOLDER {bookworm|trixie}" >&2
+    exit 2
+    ;;
+esac
+packages+=(libopencv-{core,imgproc,calib3d,imgcodecs,videoio}"$opencv")
+debian=$2
+modules=(virtio_console virtio_rng virtio_net configfs autofs4 vivid loop irq_sim gpio-sim v4l2loopback vimc)
 # Debian's kernel has the disk and its file system as modules.
 disk_modules=(virtio_pci virtio_blk crc32c_generic ext4)
 
-(($# == 1)) || {
-  echo "usage: make_image.sh FOLDER" >&2
-  exit 2
-}
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
 work=$folder/work
@@ -42,20 +49,20 @@ as_owner() { if ((EUID == 0)); then "$@"; else unshare --map-root-user "$@"; fi;
 exec 9>"$folder/lock"
 flock 9
 
-kernel_stamp=$(cat "$here/make_kernel.sh" "$here"/modules/* | hash_of)
-tree_stamp=$(echo "${packages[*]}" | cat - "$here/../../../toolchains/debian_packages.sh" | hash_of)
+kernel_stamp=$(echo "$debian" | cat - "$here/make_kernel.sh" "$here"/modules/* | hash_of)
+tree_stamp=$(echo "$debian ${packages[*]}" | cat - "$here/../../../toolchains/debian_packages.sh" | hash_of)
 image_stamp=$(echo "$kernel_stamp $tree_stamp" | cat - "$here/make_image.sh" "$here"/guest/{agent,devices,board-agent.service} | hash_of)
 
 if ! is_made kernel "$kernel_stamp"; then
   rm -f "$folder/kernel.stamp"
-  "$here/make_kernel.sh" "$folder/kernel" 9>&-
+  "$here/make_kernel.sh" "$folder/kernel" "$debian" 9>&-
   echo "$kernel_stamp" >"$folder/kernel.stamp"
 fi
 
 if ! is_made tree "$tree_stamp"; then
   rm -rf "$folder/tree.stamp" "$folder/tree" "$work"
   say "fetching Debian for the board"
-  debian_open "$work/apt" own arm64
+  debian_open "$work/apt" "$debian" arm64
   debian_download_all "$work/debs" "${packages[@]}"
   debian_close
   say "unpacking $(find "$work/debs" -name '*.deb' | wc -l) packages"
@@ -88,7 +95,7 @@ put etc/group <"$tree/usr/share/base-passwd/group.master"
   echo "systemd-network:x:998:998::/:/usr/sbin/nologin"
 } >>"$tree/etc/passwd"
 printf '%s\n' messagebus:x:102: systemd-journal:x:999: systemd-network:x:998: render:x:997: kvm:x:996: sgx:x:995: \
-  input:x:994: >>"$tree/etc/group"
+  input:x:994: clock:x:993: >>"$tree/etc/group"
 sed 's|^\([^:]*\):.*|\1:*:19000:0:99999:7:::|; s|^root:[^:]*:|root::|' "$tree/etc/passwd" | put etc/shadow
 printf 'passwd: files\ngroup: files\nhosts: files dns\n' | put etc/nsswitch.conf
 printf '127.0.0.1 localhost board\n' | put etc/hosts
@@ -105,7 +112,7 @@ mkdir -p "$tree"/{proc,sys,dev,run,tmp,root,mnt,payload,var/log/journal}
 touch "$tree/etc/.updated" "$tree/var/.updated"
 units=$tree/etc/systemd/system
 for unit in systemd-random-seed systemd-update-utmp systemd-firstboot systemd-binfmt systemd-pstore getty@tty1 \
-  serial-getty@ttyAMA0 systemd-hwdb-update ldconfig; do
+  serial-getty@ttyAMA0 systemd-hwdb-update ldconfig systemd-tpm2-setup systemd-tpm2-setup-early systemd-pcrphase; do
   ln -sf /dev/null "$units/$unit.service"
 done
 for unit in apt-daily apt-daily-upgrade dpkg-db-backup e2scrub_all fstrim; do ln -sf /dev/null "$units/$unit.timer"; done
@@ -146,7 +153,11 @@ mkdir -p "$initrd"/{bin,dev,proc,sys,new,modules}
 cp "$folder/kernel/busybox" "$initrd/bin/"
 number=10
 while read -r file; do
-  cp "$file" "$initrd/modules/$((number++))_$(basename "$file")"
+  name=$((number++))_$(basename "$file" .xz)
+  case $file in
+    *.xz) xz -dc "$file" >"$initrd/modules/$name" ;;
+    *) cp "$file" "$initrd/modules/$name" ;;
+  esac
 done < <(with_needs "${disk_modules[@]}")
 cat >"$initrd/init" <<'END'
 #!/bin/busybox sh

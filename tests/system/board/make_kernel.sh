@@ -1,22 +1,25 @@
 #!/usr/bin/env bash
-# Debian's kernel for arm64 with the modules that it leaves out, built from its source:
+# Debian's kernel for arm64 with the modules that it leaves out, built from its source. Of Debian 13 that with PREEMPT_RT:
 #     FOLDER/vmlinuz             the kernel
 #     FOLDER/tree/lib/modules    all its modules, and in extra/ those of ours
 #     FOLDER/busybox             static, for an initrd
 #
-#     tests/system/board/make_kernel.sh FOLDER      (make_image.sh calls it)
+#     tests/system/board/make_kernel.sh FOLDER {bookworm|trixie}      (make_image.sh calls it)
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=toolchains/debian_packages.sh
 source "$here/../../../toolchains/debian_packages.sh"
 
-series=6.1
 cross=aarch64-linux-gnu-
 
-(($# == 1)) || {
-  echo "usage: make_kernel.sh FOLDER" >&2
-  exit 2
-}
+case $#-${2:-} in
+  2-bookworm) series=6.1 flavour='' ;;
+  2-trixie) series=6.12 flavour=-rt ;;
+  *)
+    echo "usage: make_kernel.sh FOLDER {bookworm|trixie}" >&2
+    exit 2
+    ;;
+esac
 rm -rf "$1"
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
@@ -26,18 +29,22 @@ say() { echo "board: $*"; }
 
 say "asking the mirrors for a kernel"
 machine=$(dpkg --print-architecture)
-debian_open "$work/apt" own arm64 "$machine"
-release=$(apt-cache depends linux-image-arm64 | sed -n 's/^ *Depends: linux-image-//p')
+debian_open "$work/apt" "$2" arm64 "$machine"
+release=$(apt-cache depends "linux-image$flavour-arm64" | sed -n 's/^ *Depends: linux-image-//p')
 [[ $release == "$series".* ]] || {
-  echo "make_kernel.sh: the mirrors' kernel for arm64 is '$release', this script builds modules for $series (Debian 12)" >&2
+  echo "make_kernel.sh: the mirrors' kernel of $2 for arm64 is '$release', this script builds modules for $series" >&2
   exit 1
 }
 say "fetching Linux $release and its source"
-# What the headers' build calls runs on this machine: kbuild is of its architecture.
-debian_download "$work/debs" "linux-image-$release" "linux-headers-$release" "linux-headers-${release%-arm64}-common" \
-  "linux-kbuild-$series:$machine" "linux-source-$series" v4l2loopback-dkms busybox-static
+# What the headers' build calls runs on this machine: kbuild is of its architecture. What reads the modules runs by the C
+# library of its own Debian, which may be newer than this machine's.
+version=${release%"$flavour-arm64"}
+kbuild=$(apt-cache depends "linux-headers-$release" | sed -n 's/^ *Depends: \(linux-kbuild-[^:]*\)$/\1/p')
+debian_download "$work/debs" "linux-image-$release" "linux-headers-$release" "linux-headers-$version-common$flavour" \
+  "$kbuild:$machine" "libc6:$machine" "linux-source-$series" v4l2loopback-dkms busybox-static
 debian_close
 debian_unpack "$work/tree" "$work"/debs/{linux-image,linux-headers,linux-kbuild,v4l2loopback-dkms,busybox-static}*.deb
+debian_unpack "$work/host" "$work"/debs/libc6*.deb
 cp "$work/tree/boot/vmlinuz-$release" "$folder/vmlinuz"
 cp "$work/tree/usr/bin/busybox" "$folder/busybox"
 mkdir -p "$folder/tree/lib"
@@ -55,7 +62,18 @@ cp "$here/modules/Kbuild.vimc" "$work/modules/vimc/Makefile"
 python3 "$here/modules/adapt.py" "$work/modules"
 headers=$work/tree/usr/src/linux-headers-$release
 sed -i "s|/usr/src/|$work/tree/usr/src/|" "$headers/Makefile"
-make -C "$headers" M="$work/modules" ARCH=arm64 CROSS_COMPILE="$cross" modules -j2 >"$work/make.log" 2>&1 || {
+# GCC before 13 lacks an option that only speed asks for; modules without type information need no pahole (in autoconf.h
+# that line would change the layout of a module).
+sed -i '/CONFIG_CC_HAS_MIN_FUNCTION_ALIGNMENT/d' "$headers"/include/{config/auto.conf,generated/autoconf.h}
+sed -i '/CONFIG_DEBUG_INFO_BTF_MODULES/d' "$headers/include/config/auto.conf"
+libraries=$(dirname "$(find "$work/host/usr/lib" -name libc.so.6)")
+loader=$(find "$work/host/usr/" -name 'ld-linux-*' | head -n 1)
+find "$work"/tree/usr/lib/linux-kbuild-* -type f -name '*.real-*' | while read -r program; do
+  mv "$program" "$program.elf"
+  printf '#!/bin/sh\nexec %q --library-path %q %q "$@"\n' "$loader" "$libraries" "$program.elf" >"$program"
+  chmod +x "$program"
+done
+make -C "$headers" M="$work/modules" ARCH=arm64 CROSS_COMPILE="$cross" CC="${cross}gcc" modules -j2 >"$work/make.log" 2>&1 || {
   cat "$work/make.log" >&2
   echo "make_kernel.sh: modules of Linux $release do not build" >&2
   exit 1

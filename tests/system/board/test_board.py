@@ -159,8 +159,9 @@ class PowerCut(unittest.TestCase):
         with tempfile.TemporaryDirectory() as name, unittest.mock.patch.multiple(
                 board, CACHE=pathlib.Path(name), Machine=Emulator, make_disks=lambda *_: None,
                 make=lambda _: (pathlib.Path(name) / "disk.qcow2", "state")):
+            (pathlib.Path(name) / "debian12").mkdir()
             subprocess.run(["qemu-img", "create", "-q", "-f", "qcow2", f"{name}/disk.qcow2", "1M"], check=True)
-            result = board.run("steady", {}, "start", 5, None, told.append, cuts)
+            result = board.run(board.Board("debian12", "steady"), {}, "start", 5, None, told.append, cuts)
         self.assertEqual(killed, list(range(1, len(begun) + 1)))
         return result, told, begun
 
@@ -205,6 +206,14 @@ class Cases(unittest.TestCase):
         self.assertEqual(case.limit, 240)
         self.assertEqual(case.cuts, 0)
         self.assertEqual(board.cases_of(["rig/power_cut"])[0].cuts, 2)
+
+    def test_run_on_the_boards_that_they_name_else_on_all(self):
+        on_all = board.cases_of(["board/promised"])[0]
+        self.assertEqual(on_all.boards, ["debian12", "debian13"])
+        self.assertEqual(board.cases_of(["gpio/lines_2"])[0].boards, ["debian12"])
+        self.assertNotIn("gpio/lines_2", [case.name for case in board.cases_of(["gpio"], "debian13")])
+        with self.assertRaisesRegex(board.UsageError, "none of gpio/lines_2 runs on debian13"):
+            board.cases_of(["gpio/lines_2"], "debian13")
 
 
 class SideBySide(unittest.TestCase):

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Makes modules of a board out of files of Linux 6.1, in place.
+"""Makes modules of a board out of files of Linux 6.1 or 6.12, in place.
 
     adapt.py FOLDER      with irq_sim.c and vimc/vimc-core.c
 
 irq_sim is no module there, and calls irq_to_desc(), which modules may not: the way through irq_get_irq_data() is open.
-vimc has one device; libcamera takes one camera from a media device. vimc.n_devs makes as many as are wanted.
+vimc has one device; libcamera takes one camera from a media device. vimc.n_devs makes as many as are wanted. From 0.4 on
+libcamera has its sensor draw the largest frames that there are, whatever was asked for, one a second in an emulator: those
+are smaller here.
 """
 import pathlib
 import re
@@ -40,7 +42,7 @@ def change(text, pattern, replacement, where):
     """text with the one match of pattern replaced."""
     changed, count = re.subn(pattern, lambda _: replacement, text, flags=re.S)
     if count != 1:
-        sys.exit(f"{where}: {count} places like {pattern!r}, want 1: is this Linux 6.1?")
+        sys.exit(f"{where}: {count} places like {pattern!r}, want 1: is this Linux 6.1 or 6.12?")
     return changed
 
 
@@ -59,6 +61,12 @@ def main():
     text = change(text, r"static struct platform_device vimc_pdev = \{.*?\n\};\n", "", path)
     text = change(text, r'"platform:%s", VIMC_PDEV_NAME\);', '"platform:%s", dev_name(&pdev->dev));', path)
     text = change(text, r"static int __init vimc_init\(void\).*(?=module_init\(vimc_init\))", VIMC_INIT, path)
+    path.write_text(text)
+
+    path = folder / "vimc/vimc-common.h"
+    text = path.read_text()
+    for name, value in (("WIDTH", 640), ("HEIGHT", 480)):
+        text = change(text, rf"#define VIMC_FRAME_MAX_{name} \d+", f"#define VIMC_FRAME_MAX_{name} {value}", path)
     path.write_text(text)
 
 

@@ -1,6 +1,8 @@
 #!/bin/bash
 # stereotrackd on two vimc cameras through libcamera: pairs, one unplugged and plugged in again; and without a module.
-# wants: bin/stereotrackd lib/stereotrack/stereotrack-libcamera-0.0.3.so
+# wants: bin/stereotrackd
+# wants on debian12: lib/stereotrack/stereotrack-libcamera-0.0.3.so
+# wants on debian13: lib/stereotrack/stereotrack-libcamera-0.4.so
 # limit: 300
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
@@ -30,6 +32,14 @@ file = "/run/results/figures.prom"
 END
 
 plain_calibration /run/calibration.yml 318 180
+
+# Without a module: the line says why, and how to go on.
+refuses_without_a_module() {
+  local said
+  said=$(STEREOTRACK_MODULE_PATH=/nowhere check 2>&1) && return 1
+  echo "$said"
+  grep 'libcamera: there is no module, .*/nowhere' <<<"$said"
+}
 # Nor does a module that does not load hinder cameras of the kernel's.
 v4l2_starts_without() {
   mkdir -p /run/modules

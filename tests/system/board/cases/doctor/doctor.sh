@@ -44,8 +44,12 @@ fact "a scene brings a calibration" /payload/stereotrack synth eleven --out /run
 
 fact "it looks, and the exit code tells of limits" ends_with 1 looks
 fact "what it tells is one screen" screen
-fact "it names the kernel and its preemption" tells "^NOTE +kernel +$(uname -r) .*preemption voluntary"
-fact "and the command for another one" tells 'sudo apt install linux-image-rt-arm64'
+if [[ $(uname -v) == *PREEMPT_RT* ]]; then
+  fact "it names the kernel and its preemption" tells "^OK +kernel +$(uname -r) .*PREEMPT_RT"
+else
+  fact "it names the kernel and its preemption" tells "^NOTE +kernel +$(uname -r) .*preemption voluntary"
+  fact "and the command for another one" tells 'sudo apt install linux-image-rt-arm64'
+fi
 fact "the first camera with its formats" tells '^OK +camera +/dev/video0 vivid, platform:vivid-000: .* grey8 '
 fact "its largest size and rate, its controls" tells '[0-9]+x[0-9]+ at [0-9.]+/s; .*gain <- left'
 fact "the second one" tells '^OK +camera +/dev/video1 vivid, platform:vivid-001: '

@@ -6,17 +6,27 @@ source /payload/.board/tap.sh
 
 rig=/sys/kernel/config/gpio-sim/rig
 chip=$(basename "$(readlink /run/rig)")
+# gpiod's tools of Debian 12 and 13 take other arguments.
+if command -v gpiofind >/dev/null; then
+  set_trigger() { exec gpioset --mode=signal "$chip" 0=1; }
+  monitor_ready() { exec gpiomon --num-events=4 --format='%e %s.%n' "$chip" 1; }
+  edges="1010"
+else
+  set_trigger() { exec gpioset --chip "$chip" TRIGGER=1; }
+  monitor_ready() { exec gpiomon --chip "$chip" --num-events=4 --format='%e %S' READY; }
+  edges="1212"
+fi
 value_while_set() {
-  gpioset --mode=signal "$chip" 0=1 &
+  set_trigger &
   eventually grep -qx 1 /run/rig/sim_gpio0/value
   local code=$?
   kill $!
   return "$code"
 }
 four_edges() {
-  gpiomon --num-events=4 --format='%e %s.%n' "$chip" 1 >/run/results/edges.txt &
+  monitor_ready >/run/results/edges.txt &
   local monitor=$! level
-  eventually sh -c "gpioinfo $chip | grep -q 'READY.*used'"
+  eventually sh -c "gpioinfo | grep -qE 'READY.*(used|consumer)'"
   # irq_sim tells what came since it last looked: edges without a pause between them are one.
   for level in up down up down; do
     echo "pull-$level" >/run/rig/sim_gpio1/pull
@@ -24,7 +34,7 @@ four_edges() {
   done
   wait "$monitor"
   cat /run/results/edges.txt
-  [[ $(cut -d ' ' -f 1 /run/results/edges.txt | tr -d '\n') == 1010 ]]
+  [[ $(cut -d ' ' -f 1 /run/results/edges.txt | tr -d '\n') == "$edges" ]]
 }
 
 fact "what is driven is read in sysfs" value_while_set

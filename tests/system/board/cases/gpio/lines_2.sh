@@ -1,6 +1,7 @@
 #!/bin/bash
 # Our driver on real chips by libgpiod 2, the library of Debian 13: what lines.sh shows of libgpiod 1, by the same
 # programs, and debouncing, which 1 has not.
+# boards: debian12
 # wants: tests/gpio_2_gpiod_test tests/gpio_2_board_test tests/gpio_2_lines_check tests/libgpiod.so.3
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
