@@ -19,7 +19,8 @@ A case is cases/GROUP/CASE.sh. It prints TAP (guest/tap.sh) and says in its head
 what it wants of the build folder (packages/NAME: the .deb of that name), "# brings: PATH ..." what of the project's files
 the programs read (they find them where they were when they were built), "# limit: SECONDS" of the board's clock (120),
 "# power cuts: N" how often it asks for one (0): the emulator is killed, the board boots anew with the disks as they are,
-and the case is called again, its first argument the number of cuts so far.
+and the case is called again, its first argument the number of cuts so far. "# only by name: WHY" leaves it out unless it is
+named itself.
 
 Everything lies in build/board, or where STEREOTRACK_BOARD_CACHE says. The board is booted once and its state is saved;
 each run starts from there, in seconds, on disks that forget. No board outlives board.py.
@@ -361,6 +362,7 @@ class Case:
                                    for word in ("wants", "brings"))
         self.limit, self.cuts = (int((re.findall(rf"^# {word}: (\d+)$", head, re.M) or [default])[0])
                                  for word, default in (("limit", 120), ("power cuts", 0)))
+        self.only_by_name = "".join(re.findall(r"^# only by name: (.*)$", head, re.M))
         self.facts = []  # (name, "ok" | "not ok" | "skip", text)
         self.comments = []
         self.plan = None
@@ -400,7 +402,8 @@ def cases_of(names):
     for name in names:
         if name not in groups and name not in {case.name for case in found}:
             raise UsageError(f"no such group or case: {name}; groups are {', '.join(sorted(groups))}")
-    return [case for case in found if not names or case.name in names or case.path.parent.name in names]
+    return [case for case in found if case.name in names or
+            (not case.only_by_name and (not names or case.path.parent.name in names))]
 
 
 def write_junit(cases, path):
