@@ -22,7 +22,8 @@ what it wants of the build folder (packages/NAME: the .deb of that name), "# bri
 the programs read (they find them where they were when they were built), "# limit: SECONDS" of the board's clock (120),
 "# boards: NAME ..." where it runs (all), "# wants on NAME: ..." what it wants only there,
 "# power cuts: N" how often it asks for one (0): the emulator is killed, the board boots anew with the disks as they are,
-and the case is called again, its first argument the number of cuts so far.
+and the case is called again, its first argument the number of cuts so far. "# only by name: WHY" leaves it out unless it is
+named itself.
 
 Everything lies in build/board/NAME, or NAME in the folder STEREOTRACK_BOARD_CACHE. The board is booted once and its state
 is saved; each run starts from there, in seconds, on disks that forget. No board outlives board.py.
@@ -384,6 +385,7 @@ class Case:
         self.boards = boards or list(BOARDS)
         self.limit, self.cuts = (int((re.findall(rf"^# {word}: (\d+)$", head, re.M) or [default])[0])
                                  for word, default in (("limit", 120), ("power cuts", 0)))
+        self.only_by_name = "".join(re.findall(r"^# only by name: (.*)$", head, re.M))
         self.facts = []  # (name, "ok" | "not ok" | "skip", text)
         self.comments = []
         self.plan = None
@@ -425,7 +427,8 @@ def cases_of(names, board="debian12"):
         if name not in groups and name not in {case.name for case in found}:
             raise UsageError(f"no such group or case: {name}; groups are {', '.join(sorted(groups))}")
     chosen = [case for case in found
-              if board in case.boards and (not names or case.name in names or case.path.parent.name in names)]
+              if board in case.boards and (case.name in names or (not case.only_by_name and (
+                  not names or case.path.parent.name in names)))]
     if not chosen:
         raise UsageError(f"none of {', '.join(names)} runs on {board}")
     return chosen

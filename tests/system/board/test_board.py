@@ -200,6 +200,11 @@ class Cases(unittest.TestCase):
         with self.assertRaises(board.UsageError):
             board.cases_of(["nothing"])
 
+    def test_that_take_long_are_run_only_by_name(self):
+        self.assertTrue(board.cases_of(["rig/hour"])[0].only_by_name)
+        for names in ([], ["rig"]):
+            self.assertNotIn("rig/hour", [case.name for case in board.cases_of(names)])
+
     def test_say_what_they_want_and_how_long_they_may_take(self):
         case = board.cases_of(["daemon/live"])[0]
         self.assertIn("bin/stereotrackd", case.wants)

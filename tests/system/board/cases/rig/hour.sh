@@ -2,6 +2,7 @@
 # An hour of the board's clock at two pairs a second: what the service holds after five minutes it holds after sixty.
 # wants: packages/stereotrack packages/stereotrack-tools
 # limit: 4000
+# only by name: 7200 pairs take an emulated processor a quarter of an hour of the host's, and longer where others want it
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
 # shellcheck source=tests/system/board/guest/rig.sh

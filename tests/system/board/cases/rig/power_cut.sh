@@ -16,6 +16,14 @@ frame_bytes=$((2 * 320 * 240 * 3 + 1024 + 32))
 session() { figure stereotrack_session; }
 ask() { systemctl kill --signal=USR1 stereotrackd; }
 size_of_part() { stat -c %s $recordings/*.part 2>/dev/null || echo 0; }
+is_amid_it() {
+  until (($(size_of_part) > 9 * frame_bytes)); do
+    if is "$written" 1 >/dev/null; then
+      echo "it has written already"
+      return 1
+    fi
+  done
+}
 replays() { stereotrack replay "$1" --out "$2" >"$2.txt" 2>&1; }
 
 case $1 in
@@ -60,7 +68,7 @@ END
     tell </run/first.txt
     fact "it runs" runs 110
     fact "it is asked to record" ask
-    until (($(size_of_part) > 40 * frame_bytes)); do :; done
+    fact "and is amid it" is_amid_it
     cut_the_power
     ;;
   2)
@@ -77,7 +85,7 @@ END
     read -r after all frames < <(sed -n 's/.*after byte \([0-9]*\) of \([0-9]*\): .*(\([0-9]*\) frames).*/\1 \2 \3/p' /run/torn.txt)
     fact "and it is said where it is cut" test -n "$frames"
     fact "what is lost of it is less than a frame" test $((all - after)) -lt $frame_bytes
-    fact "it has most of what was written before the cut" test "${frames:-0}" -ge 24
+    fact "it has most of what was written before the cut" test "${frames:-0}" -ge 8
     fact "all of these frames were replayed" test "$(grep -c . /run/torn/tracks.csv)" -gt 10
     fact "the service runs" runs 30
     fact "asked to record" ask
