@@ -1,8 +1,8 @@
 # 32-bit ARM, as Debian's armhf: g++-arm-linux-gnueabihf or clang, and a sysroot (cross.cmake has the settings).
 #     toolchains/make_sysroot.sh bookworm-armhf && cmake --preset armhf
 #
-# NEON with fused multiply-add is asked for, which Debian does not: Highway cannot choose it at run time there.
-# Cortex-A7, A15 and all 64-bit cores have it; A8 and A9 do not.
+# NEON with fused multiply-add is asked for, which Debian does not: Highway's headers want it. Cortex-A7, A15 and all
+# 64-bit cores have it; A8 and A9 do not. Kernels are the plain ones all the same (pipeline/core/simd.cpp).
 set(stereotrack_triplet arm-linux-gnueabihf)
 set(stereotrack_architecture armhf)
 set(stereotrack_processor armv7l)
