@@ -19,13 +19,14 @@ constexpr std::int64_t kHighwayNeon = HWY_NEON;
 constexpr std::array<std::int64_t, kSimdTargets> kHighwayTargets{0, HWY_SSE4, HWY_AVX2, HWY_AVX3 | HWY_AVX3_DL,
                                                                  kHighwayNeon};
 
-// Of Highway's targets, those that this CPU runs. 64-bit ARM has NEON, always. Earlier versions of Highway count the
-// AES instructions to it, which the Cortex-A72 of a Raspberry Pi 4 lacks and no kernel uses: they are not asked.
+// Of Highway's targets, those that this CPU runs. 64-bit ARM has NEON, always: earlier versions of Highway count the
+// AES instructions to it, which the Cortex-A72 of a Raspberry Pi 4 lacks and no kernel uses. 32-bit ARM has plain
+// kernels: NEON only estimates quotients there, and whole runs with it differ (tests/replay/same_bytes.py).
 std::int64_t supported() noexcept {
-#if HWY_ARCH_ARM_A64 && !defined(HWY_NEON_WITHOUT_AES)
-  return HWY_NEON;
+#if HWY_ARCH_ARM_V7
+  return 0;
 #else
-  return hwy::SupportedTargets();
+  return hwy::SupportedTargets() | HWY_STATIC_TARGET;
 #endif
 }
 

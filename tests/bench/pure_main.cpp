@@ -1,23 +1,18 @@
 // The pure part of the project as a program that needs no OpenCV, for CPUs that there is only an emulator of. Drawing
 // takes an emulator longest, so pairs come through a pipe from this program as it runs on the machine itself:
 //     stereotrack_pure pairs A:B ...    pairs of synthetic:eleven to standard output, 1.8 MB each
-//     stereotrack_pure results          what the pipeline makes of pairs, a hash a frame: the same on every machine
 //     stereotrack_pure work             matchers and pipelines, marked for whoever counts instructions (mark.hpp)
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
 #include <exception>
-#include <span>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "drivers/capture/synthetic/synthetic_source.hpp"
-#include "drivers/telemetry/encoder.hpp"
 #include "pipeline/core/simd.hpp"
 #include "pipeline/photometry/ingest.hpp"
 #include "pipeline/pipeline.hpp"
@@ -33,48 +28,6 @@ namespace {
 constexpr int kWidth = 640;
 constexpr int kHeight = 480;
 constexpr int kDisparities = 64;
-
-// FNV-1a, 64 bits: Fowler, Noll, Vo. It finds differences, nothing else.
-class Hash {
- public:
-  void add(std::span<const std::byte> bytes) noexcept {
-    for (const std::byte byte : bytes) value_ = (value_ ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3U;
-  }
-  template <class T>
-  void add_value(const T& value) noexcept {
-    static_assert(std::has_unique_object_representations_v<T> || std::is_floating_point_v<T>);
-    add(std::as_bytes(std::span(&value, 1)));
-  }
-  template <class T>
-  void add(ImageView<T> picture) noexcept {
-    for (int y = 0; y < picture.height; ++y) {
-      add(std::as_bytes(std::span(picture.row(y), static_cast<std::size_t>(picture.width))));
-    }
-  }
-  [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325U;
-};
-
-void add_track(Hash& hash, const TrackReport& track) {
-  hash.add_value(track.id);
-  hash.add_value(track.state);
-  hash.add_value(track.measured);
-  hash.add_value(track.has_depth);
-  for (const int edge : {track.box.left, track.box.top, track.box.width, track.box.height}) hash.add_value(edge);
-  for (const Point& corner : track.hull) {
-    hash.add_value(corner.x);
-    hash.add_value(corner.y);
-  }
-  for (const double value :
-       {track.image_x, track.image_y, track.image_vx, track.image_vy, track.confidence, track.age_s}) {
-    hash.add_value(value);
-  }
-  hash.add(std::as_bytes(std::span(track.position.data(), 3)));
-  hash.add(std::as_bytes(std::span(track.velocity.data(), 3)));
-  hash.add(std::as_bytes(std::span(track.covariance.data(), 36)));
-}
 
 // A pipeline with its memory, on frames of synthetic:eleven.
 class Tracked {
@@ -167,60 +120,6 @@ class PairReader {
  private:
   std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(2 * kPictureBytes);
 };
-
-// ---------------------------------------------------------------- results
-
-// A preset on all frames, and what came of it.
-class Results {
- public:
-  Results(const std::string& preset, const StereoCalibration& calibration)
-      : tracked_({"preset=" + preset}, calibration),
-        focal_(calibration.left.fx, calibration.left.fy),
-        encoder_({.rig = 1, .session = 1}) {}
-
-  std::uint64_t of(const FramePair& pair) {
-    const FrameResult result = tracked_.run(pair);
-    Hash hash;
-    hash.add_value(result.flags);
-    for (const TrackReport& track : result.tracks) add_track(hash, track);
-    hash.add(result.mask);
-    hash.add(result.labels);
-    for (const auto count : result.rejections) hash.add_value(count);
-    telemetry::Message message;
-    message.tracks = result.tracks;
-    message.ordinal = pair.ordinal;
-    message.capture_time = pair.capture_time;
-    message.send_time = pair.capture_time;
-    message.unit_m = 1;
-    message.focal_x_px = focal_.x();
-    message.focal_y_px = focal_.y();
-    for (const std::span<const std::byte> datagram : encoder_.encode(message, buffer_)) hash.add(datagram);
-    for (const TrackReport& track : result.tracks) confirmed_ += track.state == TrackState::kConfirmed ? 1U : 0U;
-    return hash.value();
-  }
-  /// Over all frames.
-  [[nodiscard]] unsigned confirmed() const noexcept { return confirmed_; }
-
- private:
-  Tracked tracked_;
-  Eigen::Vector2d focal_;
-  telemetry::Encoder encoder_;
-  std::array<std::byte, telemetry::kMaxMessageBytes> buffer_{};
-  unsigned confirmed_ = 0;
-};
-
-void print_results(bool lens) {
-  const StereoCalibration calibration = lens ? with_lens(ideal_cameras()) : ideal_cameras();
-  Results robust("robust", calibration);
-  Results thesis("thesis", calibration);
-  PairReader pairs;
-  std::printf("frame robust thesis\n");
-  for (FramePair pair; pairs.next(pair);) {
-    std::printf("%llu %016llx %016llx\n", static_cast<unsigned long long>(pair.ordinal),
-                static_cast<unsigned long long>(robust.of(pair)), static_cast<unsigned long long>(thesis.of(pair)));
-  }
-  std::printf("confirmed %u %u\n", robust.confirmed(), thesis.confirmed());
-}
 
 // ---------------------------------------------------------------- work
 
@@ -334,12 +233,6 @@ int main(int argc, char** argv) {
   std::vector<std::string> ranges;
   CLI::App* pairs = app.add_subcommand("pairs", "draws pairs, to standard output");
   pairs->add_option("RANGES", ranges, "A:B, ordinals from 1, both included")->required();
-  CLI::App* results =
-      app.add_subcommand("results", "reads pairs; prints a hash of each preset's results, a frame a line");
-  std::string simd;
-  bool lens = false;
-  results->add_option("--simd", simd, "instruction set: scalar, sse4, avx2, avx512, neon; else the best");
-  results->add_flag("--lens", lens, "with a lens that makes rectification interpolate");
   int warm_up = 32;
   CLI::App* work = app.add_subcommand(
       "work",
@@ -349,16 +242,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
-    if (!simd.empty()) {
-      const auto targets = stereotrack::simd_targets();
-      const auto named = std::find_if(targets.begin(), targets.end(),
-                                      [&](stereotrack::SimdTarget target) { return simd == to_string(target); });
-      if (named == targets.end() || !stereotrack::use_simd(*named)) {
-        throw std::runtime_error("--simd " + simd + ": not of this build and CPU");
-      }
-    }
     if (pairs->parsed()) stereotrack::bench::write_pairs(stereotrack::bench::parse_ranges(ranges));
-    if (results->parsed()) stereotrack::bench::print_results(lens);
     if (work->parsed()) stereotrack::bench::work(warm_up);
     if (std::fflush(stdout) != 0) throw std::runtime_error("standard output takes no more");
     return 0;

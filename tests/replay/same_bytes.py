@@ -37,7 +37,7 @@ RECORDINGS = {
     "pitch": ("baseball_stereo_slow126/one_pitch", ["--calibration", "baseball_stereo_slow126/calibration.yml",
                                                     "--frames", "1:12"], True),
     "highway": ("mono:cdnet_highway/input", ["--frames", "1:40"], False),
-    "kitti": ("kitti_odom_sample/sequences/03", [], False),
+    "kitti": ("kitti_odom_sample/sequences/03", ["--frames", "1:4"], False),
     "euroc": ("euroc_micro/mav0", [], False),
 }
 

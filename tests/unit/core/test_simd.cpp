@@ -49,6 +49,9 @@ TEST(Simd, NeonIsOnEvery64BitArm) {
   }
   EXPECT_EQ(simd_targets().back(), SimdTarget::kNeon);
 }
+#elif defined(__arm__)
+// Whose NEON does not divide.
+TEST(Simd, ThirtyTwoBitArmHasPlainKernels) { EXPECT_EQ(simd_targets().back(), SimdTarget::kScalar); }
 #endif
 
 }  // namespace
