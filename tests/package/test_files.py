@@ -36,7 +36,9 @@ class Manual(unittest.TestCase):
     def test_each_option_stands_in_it(self):
         for program, sub, options in helps():
             text = PAGES[program].read_text().replace("\\-", "-")
-            if sub:
+            if not sub:
+                text = text.split("\n.SH OPTIONS")[1].split("\n.SH")[0]
+            else:
                 self.assertIn(f"\n.SS stereotrack {sub}", text)
                 text = text.split(f"\n.SS stereotrack {sub}")[1].split("\n.S")[0]
             self.assertGreater(len(options), 0)
