@@ -11,7 +11,7 @@ source /payload/.board/rig.sh
 
 pairs=60
 latency_ms=150
-near_m=6.9
+near_m=8.45
 mkfifo /run/go
 # What was sent, byte for byte.
 compared() {
