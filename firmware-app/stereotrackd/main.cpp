@@ -1,7 +1,6 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -10,11 +9,9 @@
 #include <iostream>
 
 #include "config/error.hpp"
-#include "config/schema.hpp"
 #include "drivers/capture/film/film.hpp"
 #include "drivers/record/torn.hpp"
 #include "drivers/telemetry/authentication.hpp"
-#include "drivers/telemetry/durable_file.hpp"
 #include "drivers/telemetry/endpoint.hpp"
 #include "drivers/telemetry/session_file.hpp"
 #include "firmware-app/rig/cameras.hpp"
@@ -27,6 +24,7 @@
 #include "firmware-app/stereotrackd/panic.hpp"
 #include "firmware-app/stereotrackd/plan.hpp"
 #include "firmware-app/stereotrackd/reload.hpp"
+#include "firmware-app/stereotrackd/safe_lines.hpp"
 #include "firmware-app/stereotrackd/service.hpp"
 
 namespace stereotrack {
@@ -172,81 +170,6 @@ std::string summary_of(const capture::SourceInfo& info, const config::Configurat
   return text;
 }
 
-/// What a run took its lines by, in its state directory from before it asks for them until it has ended in order: who
-/// makes them safe after a crash must not depend on a file that somebody may have changed, or broken, since.
-class TakenLines {
- public:
-  TakenLines(const fs::path& state, const config::Configuration& configuration) : path_(path_in(state)) {
-    telemetry::write_durably(path_, config::to_text(configuration));
-  }
-  TakenLines(const TakenLines&) = delete;
-  TakenLines& operator=(const TakenLines&) = delete;
-  ~TakenLines() { forget(path_); }
-
-  static fs::path path_in(const fs::path& state) { return state / "taken_lines.toml"; }
-  static void forget(const fs::path& path) noexcept {
-    std::error_code ignored;
-    fs::remove(path, ignored);
-  }
-
- private:
-  fs::path path_;
-};
-
-bool make_lines_safe(const std::vector<config::Configuration>& configurations) {
-  bool all = true;
-  std::vector<gpio::LineSpec> lines;
-  std::vector<trigger::Pwm::Config> pwms;
-  for (const config::Configuration& configuration : configurations) {
-    std::vector<gpio::LineSpec> more = signals::line_specs(configuration);
-    if (const auto pulses = trigger_output(configuration)) more.push_back(*pulses);
-    for (const gpio::LineSpec& line : more) {
-      const auto is_same = [&](const gpio::LineSpec& other) { return to_string(other.name) == to_string(line.name); };
-      if (std::none_of(lines.begin(), lines.end(), is_same)) lines.push_back(line);
-    }
-    // One that is asked for twice is made safe twice.
-    if (const auto pwm = trigger_pwm(configuration)) pwms.push_back(*pwm);
-  }
-  for (const gpio::SafeOutcome& outcome : gpio::set_lines_safe(lines, "stereotrackd")) {
-    log(outcome.done ? LogLevel::kInfo : LogLevel::kError, outcome.text, {{"STEREOTRACK_CAUSE", "line"}});
-    all = all && outcome.done;
-  }
-  for (const trigger::Pwm::Config& pwm : pwms) {
-    try {
-      log(LogLevel::kInfo, trigger::set_pwm_safe(pwm), {{"STEREOTRACK_CAUSE", "trigger"}});
-    } catch (const std::runtime_error& error) {
-      log(LogLevel::kError, error.what(), {{"STEREOTRACK_CAUSE", "trigger"}});
-      all = false;
-    }
-  }
-  return all;
-}
-
-// Lines of the run that crashed come first: where both name one, it is as that had it.
-int safe_lines(const Arguments& arguments) {
-  std::vector<config::Configuration> configurations;
-  std::optional<config::Error> wrong;
-  config::Configuration given;
-  try {
-    given = load_configuration(arguments.config, arguments.set).configuration;
-  } catch (const config::Error& error) {
-    wrong = error;
-  }
-  fs::path taken;
-  try {
-    taken = TakenLines::path_in(state_directory(given));
-    if (fs::exists(taken)) configurations.push_back(load_configuration(taken.string(), {}).configuration);
-  } catch (const std::exception& error) {
-    log(LogLevel::kWarning, error.what(), {{"STEREOTRACK_CAUSE", "line"}});
-  }
-  if (wrong && configurations.empty()) throw config::Error(*wrong);
-  if (wrong) log(LogLevel::kError, wrong->what());
-  if (!wrong) configurations.push_back(given);
-  if (!make_lines_safe(configurations)) return kFailed;
-  if (!taken.empty()) TakenLines::forget(taken);
-  return 0;
-}
-
 // SIGUSR1.
 void record_now(const config::Configuration& configuration, daemon::Daemon& daemon) {
   record::BlackBox* box = daemon.black_box();
@@ -260,7 +183,9 @@ void record_now(const config::Configuration& configuration, daemon::Daemon& daem
 }
 
 int run(const Arguments& arguments) {
-  if (arguments.safe_lines) return safe_lines(arguments);
+  if (arguments.safe_lines) {
+    return daemon::make_lines_safe(arguments.config, arguments.set, state_directory) ? 0 : kFailed;
+  }
   Rig rig;
   rig.loaded = load_configuration(arguments.config, arguments.set);
   // Until there is somebody to read them, they must not end the program; SIGTERM may.
@@ -294,12 +219,12 @@ int run(const Arguments& arguments) {
   const daemon::Inputs::Setup inputs = daemon::input_setup(configuration);
   parts.configuration = &configuration;
   fs::path state;
-  std::unique_ptr<TakenLines> taken;
+  std::unique_ptr<daemon::TakenLines> taken;
   if (!arguments.check) {
     state = state_directory(configuration);
     fs::create_directories(state);
     // After a crash they are anywhere, and cameras and scenes take seconds: requested in their safe states before that.
-    taken = std::make_unique<TakenLines>(state, configuration);
+    taken = std::make_unique<daemon::TakenLines>(state, configuration);
     parts.lines = gpio::open_lines(signals::line_specs(configuration), "stereotrackd");
   }
   parts.source = open_source(rig, arguments.check, parts);

@@ -474,7 +474,7 @@ def run_case(case, args, results):
         things[path.name] = path
     things.update({f".board/project/{path}": PROJECT / path for path in case.brings})
     start = (f"mkdir -p {shlex.quote(str(PROJECT.parent))}\n"
-             f"ln -s /payload/.board/project {shlex.quote(str(PROJECT))}\n"
+             f"ln -sfn /payload/.board/project {shlex.quote(str(PROJECT))}\n"
              f"FACTS=$(kernel_word board.facts) limited {case.limit} {case.name} bash case.sh \"$(kernel_word board.cuts)\"")
     begin = time.monotonic()
     try:
