@@ -16,8 +16,9 @@ frame_bytes=$((2 * 320 * 240 * 3 + 1024 + 32))
 session() { figure stereotrack_session; }
 ask() { systemctl kill --signal=USR1 stereotrackd; }
 size_of_part() { stat -c %s $recordings/*.part 2>/dev/null || echo 0; }
+# Its keyframe is as long as six frames, and eight at a time are flushed: some have been by then, and more are on their way.
 is_amid_it() {
-  until (($(size_of_part) > 9 * frame_bytes)); do
+  until (($(size_of_part) > 24 * frame_bytes)); do
     if is "$written" 1 >/dev/null; then
       echo "it has written already"
       return 1
