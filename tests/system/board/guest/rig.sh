@@ -24,6 +24,26 @@ configure() {
     printf '[realtime]\nmode = "enforce"\n[metrics]\nfile = "%s"\n' "$figures"
   } >"$configuration"
 }
+# PAIRS_A_SECOND WIDTHxHEIGHT LATENCY_MS [SOURCE], standard input: more. Thirty pairs of a scene, back and forth, without
+# cameras. What leaves within 20 ms of its moment is on time: the emulated processors are few and slow.
+configure_scene() {
+  {
+    cat <<END
+[source]
+name = "${4:-synthetic:eleven}"
+fps = $1
+[synthetic]
+frames = 30
+width = ${2%x*}
+height = ${2#*x}
+[latency]
+output_ms = $3
+late_ms = 20.0
+grace_ms = 20.0
+END
+    cat
+  } | configure
+}
 # The scene of synthetic:eleven as `pairs` pairs for the loopback cameras, with its calibration. PAIRS SIZE
 draw_scene() {
   stereotrack synth eleven --out /run/scene --frames "$1" --size "$2" && cp /run/scene/calibration.yml /etc/stereotrack/
@@ -45,6 +65,7 @@ all_left() {
   done
   none stereotrack_sent_late_total
 }
+ask_for_a_recording() { systemctl kill --signal=USR1 stereotrackd; }
 restarted() { [[ $(property NRestarts) == "$1" ]]; }
 
 # A fact is asked in a shell of its own: what begins in one and ends in another is known by a file.

@@ -9,18 +9,7 @@ source /payload/.board/tap.sh
 source /payload/.board/rig.sh
 
 fact "the packages are installed" install_rig
-configure <<END
-[source]
-name = "synthetic:eleven"
-fps = 5.0
-[synthetic]
-frames = 30
-width = 160
-height = 120
-[latency]
-output_ms = 150.0
-late_ms = 20.0
-grace_ms = 20.0
+configure_scene 5.0 160x120 150.0 <<END
 [telemetry]
 destinations = ["127.0.0.1:5701"]
 [record]
@@ -45,7 +34,7 @@ fact "the clock is set an hour forward" set_clock 3600
 fact "pairs go on" rises stereotrack_frames_total 15
 fact "the clock is set two hours back" set_clock -7200
 fact "pairs go on after that, too" rises stereotrack_frames_total 15
-fact "what is asked for is recorded" systemctl kill --signal=USR1 stereotrackd
+fact "what is asked for is recorded" ask_for_a_recording
 fact "at once" eventually is 'stereotrack_recordings_total{fate="written"}' 1
 fact "all left, with their own results" all_left
 fact "no step of the capture clock was seen" is stereotrack_clock_steps_total 0

@@ -9,18 +9,7 @@ source /payload/.board/tap.sh
 source /payload/.board/rig.sh
 
 fact "the packages are installed" install_rig
-configure <<END
-[source]
-name = "synthetic:eleven"
-fps = 2.0
-[synthetic]
-frames = 30
-width = 160
-height = 120
-[latency]
-output_ms = 200.0
-late_ms = 20.0
-grace_ms = 20.0
+configure_scene 2.0 160x120 200.0 <<END
 [telemetry]
 destinations = ["127.0.0.1:5701"]
 [record]
@@ -48,7 +37,7 @@ process=$(property MainPID)
 for minute in 5 20 40 60; do
   take $minute
   # Recordings are part of a life.
-  systemctl kill --signal=USR1 stereotrackd
+  ask_for_a_recording
 done
 grown() {
   local rss_5 rss_60 threads_5 threads_60 files_5 files_60

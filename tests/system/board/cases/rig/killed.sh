@@ -9,18 +9,7 @@ source /payload/.board/tap.sh
 source /payload/.board/rig.sh
 
 fact "the packages are installed" install_rig
-configure <<END
-[source]
-name = "synthetic:eleven"
-fps = 5.0
-[synthetic]
-frames = 30
-width = 160
-height = 120
-[latency]
-output_ms = 150.0
-late_ms = 20.0
-grace_ms = 20.0
+configure_scene 5.0 160x120 150.0 <<END
 [telemetry]
 destinations = ["127.0.0.1:5701"]
 [[signal]]

@@ -89,7 +89,7 @@ fact "nothing was shed" none stereotrack_efforts_shed_total
 fact "nothing was lost" none 'stereotrack_pairs_total{fate="evicted"}' 'stereotrack_pairs_total{fate="skipped"}' \
   'stereotrack_pairs_total{fate="starved"}' 'stereotrack_pairing_total{verdict="missing_left"}' \
   'stereotrack_pairing_total{verdict="missing_right"}' 'stereotrack_pairing_total{verdict="late"}'
-fact "it is asked to record" systemctl kill --signal=USR1 stereotrackd
+fact "it is asked to record" ask_for_a_recording
 fact "there is a recording" eventually is 'stereotrack_recordings_total{fate="written"}' 1
 fact "without pairs the lines are in their safe states" eventually shows 2 0
 fact "both of them" eventually shows 3 0

@@ -14,7 +14,6 @@ written='stereotrack_recordings_total{fate="written"}'
 # A frame of a recording: two pictures of 320x240 in colour, and their heads.
 frame_bytes=$((2 * 320 * 240 * 3 + 1024 + 32))
 session() { figure stereotrack_session; }
-ask() { systemctl kill --signal=USR1 stereotrackd; }
 size_of_part() { stat -c %s $recordings/*.part 2>/dev/null || echo 0; }
 # Its keyframe is as long as six frames, and eight at a time are flushed: some have been by then, and more are on their way.
 is_amid_it() {
@@ -31,18 +30,7 @@ case $1 in
   0)
     fact "what the service keeps is on a disk of its own" use_data_disk
     fact "the packages are installed" install_rig
-    configure <<END
-[source]
-name = "synthetic:eleven"
-fps = 10.0
-[synthetic]
-frames = 30
-width = 320
-height = 240
-[latency]
-output_ms = 150.0
-late_ms = 20.0
-grace_ms = 20.0
+    configure_scene 10.0 320x240 150.0 <<END
 [record]
 on = true
 seconds = 10.0
@@ -54,7 +42,7 @@ END
     fact "the service is ready" begin
     fact "it runs" runs 110
     echo "session $(session)" | tell
-    fact "it is asked to record" ask
+    fact "it is asked to record" ask_for_a_recording
     fact "and has written" eventually is "$written" 1
     cut_the_power
     ;;
@@ -70,7 +58,7 @@ END
     fact "it runs" runs 110
     # As an SD card that is worn: what the emulator takes at once is too fast to be cut.
     fact "its disk is slow" systemctl set-property --runtime stereotrackd 'IOWriteBandwidthMax=/dev/vdc 4M'
-    fact "it is asked to record" ask
+    fact "it is asked to record" ask_for_a_recording
     fact "and is amid it" is_amid_it
     cut_the_power
     ;;
@@ -91,7 +79,7 @@ END
     fact "it has most of what was written before the cut" test "${frames:-0}" -ge 8
     fact "all of these frames were replayed" test "$(grep -c . /run/torn/tracks.csv)" -gt 10
     fact "the service runs" runs 30
-    fact "asked to record" ask
+    fact "asked to record" ask_for_a_recording
     fact "it does" eventually is "$written" 1
     fact "the service ends" end
     journal

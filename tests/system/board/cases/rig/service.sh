@@ -5,10 +5,8 @@
 # limit: 1500
 # shellcheck source=tests/system/board/guest/tap.sh
 source /payload/.board/tap.sh
-# shellcheck source=tests/system/board/guest/daemon.sh
-source /payload/.board/daemon.sh
-figures=/run/stereotrack/figures.prom
-configuration=/etc/stereotrack/stereotrackd.toml
+# shellcheck source=tests/system/board/guest/rig.sh
+source /payload/.board/rig.sh
 paired='stereotrack_pairing_total{verdict="paired"}'
 
 lines() {
@@ -56,7 +54,6 @@ is_locked() { (($(awk '/^VmLck/ { print $2 }' "/proc/$(property MainPID)/status"
 # THREAD PRIORITY
 runs_at() { ps -L -o comm=,cls=,rtprio= -p "$(property MainPID)" | grep -E "^$1 +FF +$2\$"; }
 holds() { find "/proc/$(property MainPID)/fd" -lname "$1" | grep .; }
-shows() { [[ $(<"/run/rig/sim_gpio$1/value") == "$2" ]]; }
 beats() { eventually shows 4 1 && eventually shows 4 0 && eventually shows 4 1; }
 edges='stereotrack_input_edges_total{input="ready",line="rig:READY"}'
 edge_counts() {
@@ -117,7 +114,7 @@ fact "its line beats" beats
 fact "edges are counted" edge_counts
 fact "datagrams come" stereotrack monitor --count 10 --timeout 20
 fact "figures are served" grep '^stereotrack_frames_total' <(curl -s http://127.0.0.1:9464/metrics)
-fact "it records when it is asked to" systemctl kill --signal=USR1 stereotrackd
+fact "it records when it is asked to" ask_for_a_recording
 fact "into its state directory" eventually recorded /var/lib/stereotrack
 fact "a disk is none of its devices" is_forbidden /dev/vda
 fact "the kernel's log neither" is_forbidden /dev/kmsg

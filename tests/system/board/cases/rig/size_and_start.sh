@@ -41,18 +41,7 @@ END
 }
 # PATH SIZE...: the scene, or what was recorded of it.
 plays() {
-  configure <<END
-[source]
-name = "$1"
-fps = 5.0
-[synthetic]
-frames = 30
-width = 320
-height = 240
-[latency]
-output_ms = 190.0
-late_ms = 20.0
-grace_ms = 20.0
+  configure_scene 5.0 320x240 190.0 "$1" <<END
 [record]
 on = true
 seconds = 5.0
@@ -84,7 +73,7 @@ case $1 in
     plays synthetic:eleven
     fact "on a scene the service is ready" begin
     fact "it runs" runs 40
-    fact "it is asked to record" systemctl kill --signal=USR1 stereotrackd
+    fact "it is asked to record" ask_for_a_recording
     fact "it does" eventually is 'stereotrack_recordings_total{fate="written"}' 1
     fact "it ends" end
     plays "$(recording)"
