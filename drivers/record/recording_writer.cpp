@@ -10,30 +10,10 @@
 #include <cstring>
 #include <exception>
 
+#include "drivers/telemetry/durable_file.hpp"
 #include "pipeline/core/checksum.hpp"
 
 namespace stereotrack::record {
-
-namespace {
-
-// A file that was renamed is found after a power cut only once its folder is on the disk, too.
-bool flush_folder_of(const std::filesystem::path& path) noexcept {
-  try {
-    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-    const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (directory < 0) return false;
-    const bool done = ::fsync(directory) == 0;
-    const int error = errno;
-    ::close(directory);
-    errno = error;
-    return done;
-  } catch (const std::exception&) {
-    errno = ENOMEM;
-    return false;
-  }
-}
-
-}  // namespace
 
 bool RecordingWriter::open(const std::filesystem::path& path) noexcept {
   abandon();
@@ -107,7 +87,7 @@ bool RecordingWriter::commit() noexcept {
     ::unlink(part_.c_str());
     return false;
   }
-  if (!flush_folder_of(path_)) error_ = errno;
+  if (!telemetry::sync_folder_of(path_)) error_ = errno;
   return error_ == 0;
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <exception>
 
 #include "drivers/telemetry/endpoint.hpp"
 
@@ -45,10 +46,20 @@ void write_durably(const std::filesystem::path& path, std::string_view content) 
     errno = error;
     fail();
   }
-  // A file that was renamed is found after a power cut only once its folder is on the disk, too.
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-  const Socket directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (directory.fd() < 0 || ::fsync(directory.fd()) != 0) fail();
+  if (!sync_folder_of(path)) fail();
+}
+
+bool sync_folder_of(const std::filesystem::path& path) noexcept {
+  int error = 0;
+  try {
+    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+    const Socket directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (directory.fd() < 0 || ::fsync(directory.fd()) != 0) error = errno;
+  } catch (const std::exception&) {
+    error = ENOMEM;
+  }
+  if (error != 0) errno = error;
+  return error == 0;
 }
 
 }  // namespace stereotrack::telemetry
