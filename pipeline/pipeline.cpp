@@ -107,6 +107,7 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   if (!keep(self.tracker_, Tracker::create(config.track, config.features, view, arena), outcome)) {
     return fail(outcome.error());
   }
+  self.tracker_->observe(setup.decisions);
   self.memory_.charge(MemoryPart::kTracker, arena);
   if (arena.failed()) return fail(Fault::kOutOfMemory);
   return self;
@@ -268,7 +269,8 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
                                 .cr = left_.cr,
                                 .strength = left_.distance,
                                 .predictions = predictions_,
-                                .rectifier = both ? rectifier() : nullptr};
+                                .rectifier = both ? rectifier() : nullptr,
+                                .observer = setup_.decisions};
   for (Detector::Candidate& candidate : detector_->segment(objects)) match_whole(candidate, objects);
   const std::span<const Detection> detections = detector_->conclude(objects);
   ended(Stage::kObjects);
@@ -516,6 +518,7 @@ void Pipeline::reject_background() noexcept {
       if (behind) moving_.at(x, y) = AdaptiveBackground::kForget;
       if (ghost) moving_.at(x, y) = AdaptiveBackground::kGhost;
     });
+    setup_.decisions.tell(RejectedCandidate{Rejection::kOwnSurface, blob.box, blob.area});
     blob.area = 0;
     ++rejections_[static_cast<std::size_t>(Rejection::kOwnSurface)];
   }
@@ -547,7 +550,9 @@ void Pipeline::remove_shadows() noexcept {
     if (rest * 100 >= blob.area * kShadowRestPercent) continue;
     for_each_run(blobs_.labels, blob.box, blob.label,
                  [&](int y, int begin, int end) { std::fill(left_.mask.row(y) + begin, left_.mask.row(y) + end, 0); });
-    if (blob.area > 0) ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];
+    if (blob.area <= 0) continue;
+    setup_.decisions.tell(RejectedCandidate{Rejection::kShadow, blob.box, blob.area});
+    ++rejections_[static_cast<std::size_t>(Rejection::kShadow)];
   }
   (void)opening_->run(left_.mask, scratch_);
   if (background_left_) (void)contour_fill_->run(scratch_, scratch_);

@@ -117,7 +117,7 @@ Painter::Painter(int width, int height, const RectifiedGeometry* geometry, Lengt
   mask_area_ = fit({width, height}, {side.x, side.y + body - 200, panel, 200});
 }
 
-const cv::Mat& Painter::draw(const FramePair& pair, const FrameResult& result) {
+const cv::Mat& Painter::draw(const FramePair& pair, const FrameResult& result, const Annotation* annotation) {
   if (!first_) first_ = result.capture_time;
   trails_.add(result);
   canvas_.setTo(kBackground);
@@ -128,6 +128,7 @@ const cv::Mat& Painter::draw(const FramePair& pair, const FrameResult& result) {
     top_view_->draw(view, result, trails_);
   }
   if (!mask_area_.empty()) draw_mask(mask_area_, result);
+  if (annotation != nullptr) draw_annotation(*annotation);
   return canvas_;
 }
 
@@ -217,6 +218,31 @@ void Painter::draw_picture(const Picture& raw, const FrameResult& result) {
     }
     const Polyline box = corners(track.box, scale_);
     labels.draw(text, cv::Rect(cv::Point(box[0]), cv::Point(box[2])), kText, pen_of(track).colour);
+  }
+}
+
+// Marks where things are, then the lines, as many as a third of the picture has room for, cut where it ends.
+void Painter::draw_annotation(const Annotation& annotation) {
+  cv::Mat picture = canvas_(picture_area_);
+  Labels labels(picture, true);
+  for (const Annotation::Mark& mark : annotation.marks) {
+    const bool rejected = mark.kind == Annotation::Kind::kRejected;
+    const cv::Scalar colour = rejected ? kWarning : kBright;
+    const Polyline box = corners(mark.box, scale_);
+    draw_line(picture, box, true, {colour, 0.9, 1, mark.kind != Annotation::Kind::kDetection});
+    labels.draw(mark.text, cv::Rect(cv::Point(box[0]), cv::Point(box[2])), kSmall, colour);
+  }
+  constexpr int kLine_px = 16;
+  const auto room = static_cast<std::size_t>(std::max(picture.rows / 3 / kLine_px, 1));
+  const std::size_t shown = std::min(annotation.lines.size(), room);
+  if (shown == 0) return;
+  const int height = static_cast<int>(shown) * kLine_px + 8;
+  cv::Mat foot = picture.rowRange(std::max(picture.rows - height, 0), picture.rows);
+  foot *= 0.25;
+  for (std::size_t i = 0; i < shown; ++i) {
+    const bool more = i + 1 == shown && shown < annotation.lines.size();
+    const std::string text = more ? "..." : annotation.lines[i];
+    draw_text(foot, text, {8, static_cast<int>(i + 1) * kLine_px}, kSmall, kBright);
   }
 }
 

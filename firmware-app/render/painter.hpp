@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "firmware-app/render/annotation.hpp"
 #include "firmware-app/render/top_view.hpp"
 #include "firmware-app/render/trails.hpp"
 #include "pipeline/frame.hpp"
@@ -25,11 +26,14 @@ class Painter {
   [[nodiscard]] cv::Size size() const { return canvas_.size(); }
 
   /// kBgr8; valid until the next call.
-  [[nodiscard]] const cv::Mat& draw(const FramePair& pair, const FrameResult& result);
+  /// `annotation`: marks in the picture and lines over its foot; null for none.
+  [[nodiscard]] const cv::Mat& draw(const FramePair& pair, const FrameResult& result,
+                                    const Annotation* annotation = nullptr);
 
  private:
   void draw_header(const FrameResult& result);
   void draw_picture(const Picture& raw, const FrameResult& result);
+  void draw_annotation(const Annotation& annotation);
   void draw_mask(cv::Rect area, const FrameResult& result);
 
   cv::Rect picture_area_;

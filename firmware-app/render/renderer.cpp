@@ -24,8 +24,8 @@ class PainterToOutput final : public Renderer {
         output_(names_video(target) ? make_video_output(target, painter_.size(), rate_hz(info))
                                     : make_folder_output(target)) {}
 
-  void draw(const FramePair& pair, const FrameResult& result) override {
-    output_->write(pair.ordinal, painter_.draw(pair, result));
+  void draw(const FramePair& pair, const FrameResult& result, const Annotation* annotation) override {
+    output_->write(pair.ordinal, painter_.draw(pair, result, annotation));
   }
   void commit() override { output_->commit(); }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "drivers/capture/frame_source.hpp"
+#include "firmware-app/render/annotation.hpp"
 #include "pipeline/pipeline.hpp"
 
 namespace stereotrack::render {
@@ -18,7 +19,8 @@ class Renderer {
   virtual ~Renderer() = default;
 
   /// Throws std::runtime_error with one line naming the file (disk full).
-  virtual void draw(const FramePair& pair, const FrameResult& result) = 0;
+  /// `annotation`: what is said of the frame beside its targets; null for nothing.
+  virtual void draw(const FramePair& pair, const FrameResult& result, const Annotation* annotation) = 0;
 
   /// Makes what was drawn whole under its name. Without it nothing that looks whole stays.
   virtual void commit() = 0;

@@ -65,13 +65,15 @@ void check_rig(Rig& rig, const capture::SourceInfo& info) {
 }
 
 Pipeline make_pipeline(const PipelineConfig& config, const StereoCalibration* calibration,
-                       const capture::SourceInfo& info, Arena& arena, const StageObserver& observer) {
+                       const capture::SourceInfo& info, Arena& arena, const StageObserver& observer,
+                       const DecisionObserver& decisions) {
   Pipeline::Setup setup;
   setup.width = info.width;
   setup.height = info.height;
   setup.colour = has_colour(info.format);
   setup.calibration = calibration;
   setup.observer = observer;
+  setup.decisions = decisions;
   const Result<Pipeline> pipeline = Pipeline::create(config, setup, arena);
   if (!pipeline.has_value()) {
     throw std::runtime_error(info.name + ": no pipeline for pictures of " + std::to_string(info.width) + "x" +
@@ -80,8 +82,10 @@ Pipeline make_pipeline(const PipelineConfig& config, const StereoCalibration* ca
   return *pipeline;
 }
 
-Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena, const StageObserver& observer) {
-  return make_pipeline(rig.configuration().pipeline, info.stereo ? &*rig.calibration : nullptr, info, arena, observer);
+Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena, const StageObserver& observer,
+                       const DecisionObserver& decisions) {
+  return make_pipeline(rig.configuration().pipeline, info.stereo ? &*rig.calibration : nullptr, info, arena, observer,
+                       decisions);
 }
 
 void print_memory(std::ostream& out, const MemoryUse& memory) {

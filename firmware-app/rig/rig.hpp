@@ -55,9 +55,10 @@ void check_rig(Rig& rig);
 /// The pipeline for what a source delivers; `calibration` is null for mono. Throws std::runtime_error with the stage's
 /// fault in words.
 [[nodiscard]] Pipeline make_pipeline(const PipelineConfig& config, const StereoCalibration* calibration,
-                                     const capture::SourceInfo& info, Arena& arena, const StageObserver& observer = {});
+                                     const capture::SourceInfo& info, Arena& arena, const StageObserver& observer = {},
+                                     const DecisionObserver& decisions = {});
 [[nodiscard]] Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena,
-                                     const StageObserver& observer = {});
+                                     const StageObserver& observer = {}, const DecisionObserver& decisions = {});
 
 /// What a pipeline took, by part, as a table for people.
 void print_memory(std::ostream& out, const MemoryUse& memory);

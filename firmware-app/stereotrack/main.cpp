@@ -60,6 +60,10 @@ int run(int argc, char** argv) {
   replay_command->add_option("--pace", pace, "max: as fast as it goes; real: in real time, with telemetry over UDP")
       ->check(CLI::IsMember({"max", "real"}));
   replay_command->add_option("--frames", replay_frames, "A:B, ordinals from 1, both included");
+  std::string explain;
+  replay_command->add_option("--explain", explain,
+                             "ID of a target, or frames A:B: why it was born, associated, lost; into explain.txt of "
+                             "--out, and into the rendered picture");
   bool check_config = false;
   replay_command->add_flag("--check-config", check_config,
                            "only checks configuration, calibration and source, and prints the memory by stage");
@@ -119,6 +123,7 @@ int run(int argc, char** argv) {
   if (*replay_command) {
     replay.real_time = pace == "real";
     if (!replay_frames.empty()) replay.frames = stereotrack::parse_frames(replay_frames);
+    if (!explain.empty()) replay.explain = stereotrack::parse_explain(explain);
     if (check_config) return stereotrack::check_replay(replay, std::cout);
     return stereotrack::run_replay(replay, std::cout, std::cerr);
   }

@@ -96,20 +96,31 @@ telemetry::Encoder::Config identity_of(const Rig& rig) {
   return config;
 }
 
+std::unique_ptr<Explanation> make_explanation(const std::optional<ExplainRequest>& request, const Rig& rig) {
+  if (!request) return nullptr;
+  return std::make_unique<Explanation>(*request, rig.configuration().pipeline, rig.unit_m);
+}
+
 // Everything that one replay carries from frame to frame.
 class Replay {
  public:
-  Replay(const ReplayArguments& arguments, const Interrupts& interrupts, std::ostream& messages)
+  Replay(const ReplayArguments& arguments, const Interrupts& interrupts, std::ostream& out, std::ostream& messages)
       : arguments_(arguments),
         interrupts_(interrupts),
+        out_(out),
         messages_(messages),
         rig_(open_rig(arguments.rig)),
-        pipeline_(make_pipeline(rig_, rig_.source->info(), arena_, times_.observer())),
+        explanation_(make_explanation(arguments.explain, rig_)),
+        pipeline_(make_pipeline(rig_, rig_.source->info(), arena_, times_.observer(),
+                                explanation_ ? explanation_->observer() : DecisionObserver{})),
         encoder_(identity_of(rig_)) {
     arena_.seal();
     if (arguments.out) {
       make_output_folder(*arguments.out);
       file_ = std::make_unique<telemetry::FileSink>(fs::path(*arguments.out) / "telemetry.bin");
+    }
+    if (arguments.out && arguments.explain) {
+      explanations_ = std::make_unique<OutputFile>(fs::path(*arguments.out) / "explain.txt");
     }
     if (arguments.real_time) {
       udp_ = std::make_unique<telemetry::UdpSender>(
@@ -155,6 +166,7 @@ class Replay {
       throw std::runtime_error(rig_.source->info().name + ": no pair could be read in the frames asked for (" +
                                std::to_string(summary_.skipped) + " skipped)");
     }
+    if (explanation_ && !explained_) messages_ << "--explain: " << missing_explanation() << '\n';
     if (renderer_) renderer_->commit();
     summary_.tracks = tracks_.tracks();
     summary_.rows = tracks_.rows();
@@ -169,11 +181,13 @@ class Replay {
     try {
       tracks_.save(folder / "tracks.csv");
       if (!file_->commit()) throw std::runtime_error(file_->status());
+      if (explanations_) explanations_->commit();
       save_summary(folder / "summary.json", summary_, &times_);
     } catch (const std::runtime_error&) {
-      // All three or none: some of them beside those of an earlier run would look like one run's.
+      // All or none: some of them beside those of an earlier run would look like one run's.
       std::error_code ignored;
-      for (const char* name : {"tracks.csv", "telemetry.bin", "summary.json"}) fs::remove(folder / name, ignored);
+      for (const char* name : {"tracks.csv", "telemetry.bin", "explain.txt", "summary.json"})
+        fs::remove(folder / name, ignored);
       throw;
     }
   }
@@ -198,6 +212,11 @@ class Replay {
   }
 
  private:
+  [[nodiscard]] std::string missing_explanation() const {
+    if (arguments_.explain->id == 0) return "none of these frames was replayed";
+    return "no target had the id " + std::to_string(arguments_.explain->id) + "; ids stand in tracks.csv and --render";
+  }
+
   // A recording's pairs go on from the state in which its run was, and with the decisions that were made.
   void begin_recording(const record::RecordingSource& recording) {
     if (!recording.warning().empty()) messages_ << recording.warning() << '\n';
@@ -222,6 +241,7 @@ class Replay {
     pixels_.add(pair.left);
     if (!pair.right.empty()) pixels_.add(pair.right);
     times_.frame_begins();
+    if (explanation_) explanation_->frame_begins();
     const std::uint64_t before = allocations_of_this_thread();
     const EffortBits leave_out = rig_.recording != nullptr ? rig_.recording->decisions().shed : EffortBits{0};
     const Result<FrameResult> result = pipeline_.run(pair, leave_out);
@@ -239,8 +259,24 @@ class Replay {
     summary_.hulls_reduced = result->hulls_reduced;
     tracks_.add(pair.ordinal, result->tracks);
     publish(pair, *result);
-    if (renderer_) renderer_->draw(pair, *result);
+    const render::Annotation* said = explanation_ ? &explain(*result) : nullptr;
+    if (renderer_) renderer_->draw(pair, *result, said);
     skipped_before_ = false;
+  }
+
+  const render::Annotation& explain(const FrameResult& result) {
+    if (!first_time_) first_time_ = result.capture_time;
+    const render::Annotation& said =
+        explanation_->frame_ends(result, seconds_between(*first_time_, result.capture_time));
+    for (const std::string& line : said.lines) {
+      if (explanations_) {
+        explanations_->write(line + "\n");
+      } else {
+        out_ << line << '\n';
+      }
+      explained_ = true;
+    }
+    return said;
   }
 
   void publish(const FramePair& pair, const FrameResult& result) {
@@ -306,9 +342,13 @@ class Replay {
 
   const ReplayArguments& arguments_;
   const Interrupts& interrupts_;
+  std::ostream& out_;
   std::ostream& messages_;
   Rig rig_;
   StageTimes times_;
+  std::unique_ptr<Explanation> explanation_;
+  std::unique_ptr<OutputFile> explanations_;
+  std::optional<CaptureTime> first_time_;
   Arena arena_{runtime::advise_large_pages};
   Pipeline pipeline_;
   telemetry::Encoder encoder_;
@@ -322,6 +362,7 @@ class Replay {
   TracksFile tracks_;
   Summary summary_;
   bool skipped_before_ = false;
+  bool explained_ = false;
 
   // Of a recording: states that messages may yet leave with, and how far they have left.
   struct State {
@@ -338,7 +379,7 @@ class Replay {
 int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream& messages) {
   // First of all: no file may be open yet when ctrl-C would still end the program at once.
   const Interrupts interrupts;
-  Replay replay(arguments, interrupts, messages);
+  Replay replay(arguments, interrupts, out, messages);
   if (!replay.run()) {
     throw std::runtime_error(arguments.rig.source + ": interrupted; nothing was written");
   }

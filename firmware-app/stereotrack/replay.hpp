@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "firmware-app/stereotrack/explain.hpp"
 #include "firmware-app/stereotrack/rig.hpp"
 
 namespace stereotrack {
@@ -11,16 +12,17 @@ namespace stereotrack {
 /// `stereotrack replay SOURCE ...`
 struct ReplayArguments {
   RigArguments rig;
-  std::optional<std::string> out;     ///< --out DIR
-  std::optional<std::string> render;  ///< --render FILE.mp4, or a folder for PNG pictures
-  bool real_time = false;             ///< --pace real
-  FrameRange frames;                  ///< --frames A:B
+  std::optional<std::string> out;         ///< --out DIR
+  std::optional<std::string> render;      ///< --render FILE.mp4, or a folder for PNG pictures
+  std::optional<ExplainRequest> explain;  ///< --explain ID|A:B
+  bool real_time = false;                 ///< --pace real
+  FrameRange frames;                      ///< --frames A:B
 };
 
 /// Runs a source through the pipeline and writes what was asked for. Progress and skipped frames go to
-/// `messages`, the closing table to `out`. Answers the exit code. Throws config::Error (exit 2) or
-/// std::runtime_error (exit 1), one line; then, and after ctrl-C, no file of --out
-/// and no video is left behind unless it was whole before; PNG pictures so far stay, each whole.
+/// `messages`, explanations (but with --out, where they become explain.txt) and the closing table to `out`. Answers the
+/// exit code. Throws config::Error (exit 2) or std::runtime_error (exit 1), one line; then, and after ctrl-C, no file
+/// of --out and no video is left behind unless it was whole before; PNG pictures so far stay, each whole.
 int run_replay(const ReplayArguments& arguments, std::ostream& out, std::ostream& messages);
 
 /// `stereotrack replay SOURCE ... --check-config`: opens and checks all that run_replay() would, makes the pipeline,

@@ -14,12 +14,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::uint64_t parse_ordinal(std::string_view text, const std::string& whole, std::uint64_t absent) {
+std::uint64_t parse_ordinal(std::string_view text, const std::string& said, std::uint64_t absent) {
   if (text.empty()) return absent;
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value == 0) {
-    throw config::Error("--frames " + whole + ": want A:B with ordinals from 1, as in --frames 100:250");
+    throw config::Error(said + ": want A:B with ordinals from 1, as in 100:250");
   }
   return value;
 }
@@ -42,18 +42,19 @@ bool is_kitti_colour(const fs::path& folder) {
 
 }  // namespace
 
-FrameRange parse_frames(const std::string& text) {
+FrameRange parse_frames(const std::string& text, const std::string& option) {
+  const std::string said = option + " " + text;
   const std::size_t colon = text.find(':');
   const std::string_view view = text;
   FrameRange range;
   if (colon == std::string::npos) {
-    range.first = range.last = parse_ordinal(view, text, 0);
+    range.first = range.last = parse_ordinal(view, said, 0);
   } else {
-    range.first = parse_ordinal(view.substr(0, colon), text, 1);
-    range.last = parse_ordinal(view.substr(colon + 1), text, UINT64_MAX);
+    range.first = parse_ordinal(view.substr(0, colon), said, 1);
+    range.last = parse_ordinal(view.substr(colon + 1), said, UINT64_MAX);
   }
   if (range.first == 0 || range.first > range.last) {
-    throw config::Error("--frames " + text + ": the first frame comes after the last; want A:B with A <= B");
+    throw config::Error(said + ": the first frame comes after the last; want A:B with A <= B");
   }
   return range;
 }

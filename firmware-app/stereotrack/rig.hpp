@@ -23,8 +23,8 @@ struct FrameRange {
   std::uint64_t last = UINT64_MAX;
 };
 
-/// A:B, A:, :B, or N. Throws config::Error.
-[[nodiscard]] FrameRange parse_frames(const std::string& text);
+/// A:B, A:, :B, or N, of the option that the message names. Throws config::Error.
+[[nodiscard]] FrameRange parse_frames(const std::string& text, const std::string& option = "--frames");
 
 /// What they name, opened and checked. Throws config::Error (exit 2) or std::runtime_error (exit 1), one line each.
 [[nodiscard]] Rig open_rig(const RigArguments& arguments);

@@ -558,6 +558,11 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   return true;
 }
 
+void Detector::reject(const Input& in, const Candidate& candidate, Rejection why) noexcept {
+  reject(why);
+  in.observer.tell(RejectedCandidate{why, candidate.box, candidate.area, candidate.has_depth, candidate.disparity});
+}
+
 std::span<const Detection> Detector::conclude(const Input& in) noexcept {
   detections_.clear();
   // A candidate is large: their places are sorted.
@@ -573,26 +578,26 @@ std::span<const Detection> Detector::conclude(const Input& in) noexcept {
   for (std::ptrdiff_t i = 0; i < count; ++i) {
     const Candidate& candidate = candidates_[order[static_cast<std::size_t>(i)]];
     if (candidate.area < min_area_) {
-      reject(Rejection::kSmall);
+      reject(in, candidate, Rejection::kSmall);
       continue;
     }
     const bool known = candidate.claim >= 0;
     if (in.rectifier != nullptr && !candidate.has_depth && !known) {
-      reject(Rejection::kNoTexture);
+      reject(in, candidate, Rejection::kNoTexture);
       continue;
     }
     if (candidate.has_depth && candidate.scatter > std::max(config_.most_scatter * candidate.disparity, 1.5) &&
         !known) {
-      reject(Rejection::kInconsistent);
+      reject(in, candidate, Rejection::kInconsistent);
       continue;
     }
     if (candidate.own_surface) {
-      reject(Rejection::kOwnSurface);
+      reject(in, candidate, Rejection::kOwnSurface);
       continue;
     }
     Detection detection;
     if (detections_.full() || !describe(in, candidate, detection)) {
-      reject(Rejection::kNoRoom);
+      reject(in, candidate, Rejection::kNoRoom);
       continue;
     }
     (void)detections_.push(detection);

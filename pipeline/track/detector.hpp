@@ -12,27 +12,11 @@
 #include "pipeline/geometry/rectify.hpp"
 #include "pipeline/shape/blob_extractor.hpp"
 #include "pipeline/shape/convex_hull.hpp"
+#include "pipeline/track/decision.hpp"
 #include "pipeline/track/depth_segments.hpp"
 #include "pipeline/track/detection.hpp"
 
 namespace stereotrack {
-
-/// Why a candidate is no object.
-enum class Rejection : std::uint8_t {
-  kSmall,         ///< fewer than min_area_px pixels
-  kNoTexture,     ///< stereo source, but nothing in it could be matched
-  kInconsistent,  ///< its disparities scatter too much to be one object
-  kShadow,        ///< the shadow test left nothing of it
-  kOwnSurface,    ///< its disparity is the background's own: light, a shadow or a mark
-  kNoRoom,        ///< more runs of the mask, blobs or candidates than there is room for
-};
-inline constexpr std::size_t kRejections = 6;
-[[nodiscard]] constexpr const char* to_string(Rejection why) noexcept {
-  constexpr std::array<const char*, kRejections> kNames{"small",  "no_texture",  "inconsistent_depth",
-                                                        "shadow", "own_surface", "no_room"};
-  return kNames[static_cast<std::size_t>(why)];
-}
-using RejectionCounts = std::array<std::uint32_t, kRejections>;
 
 /// Blobs and depth -> detections: candidates are split, merged and rejected.
 ///
@@ -80,6 +64,7 @@ class Detector {
     ImageView<const std::uint8_t> strength;  ///< distance to the background, any unit
     std::span<const Prediction> predictions;
     const Rectifier* rectifier = nullptr;  ///< null for mono
+    DecisionObserver observer;             ///< of what is rejected
   };
 
   /// An object in the making: what is left of the blobs after splitting and merging.
@@ -151,6 +136,7 @@ class Detector {
                                      const Rect& united) const noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
   void reject(Rejection why) noexcept { ++rejections_[static_cast<std::size_t>(why)]; }
+  void reject(const Input& in, const Candidate& candidate, Rejection why) noexcept;
 
   Config config_;
   int width_ = 0;

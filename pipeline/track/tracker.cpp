@@ -186,37 +186,40 @@ bool Tracker::sees_depth(const Target& target, const Detection& detection) const
   return !target.has_depth || !(z > 0) || !is_blind(detection.box, view_.focal_baseline / z);
 }
 
-double Tracker::cost(const Target& target, const Detection& detection) const noexcept {
-  const Vector2 z = centre(target, detection);
-  const auto innovation = target.image.innovation(z, centre_noise(config_, detection.box));
+Tracker::Weighed Tracker::weigh(const Target& target, const Detection& detection) const noexcept {
+  Weighed pair;
+  const auto innovation = target.image.innovation(centre(target, detection), centre_noise(config_, detection.box));
   // Half the step again as standard deviation along the motion: a frame may be missing without a trace.
   const Vector2 step = target.image.velocity() * (dt_ * 0.5);
   const Matrix2 S = innovation.S + step * step.transpose();
   const double determinant = S(0, 0) * S(1, 1) - S(0, 1) * S(1, 0);
-  if (!(determinant > 0)) return Assignment::kForbidden;
   const Vector2& y = innovation.y;
-  const double in_picture =
-      (S(1, 1) * y.x() * y.x() - 2 * S(0, 1) * y.x() * y.y() + S(0, 0) * y.y() * y.y()) / determinant;
+  pair.offset = y;
+  pair.offset_sd = {std::sqrt(std::max(S(0, 0), 0.0)), std::sqrt(std::max(S(1, 1), 0.0))};
+  pair.cost.gate = PairCost::Gate::kPicture;
+  if (!(determinant > 0)) return pair;
+  pair.cost.picture = (S(1, 1) * y.x() * y.x() - 2 * S(0, 1) * y.x() * y.y() + S(0, 0) * y.y() * y.y()) / determinant;
   const double limit = square(config_.gate);
-  if (!(in_picture <= limit)) return Assignment::kForbidden;
+  if (!(pair.cost.picture <= limit)) return pair;
 
-  double in_depth = 0;
   const double z_predicted = target.space.position().z();
   if (target.has_depth && sees_depth(target, detection) && z_predicted > 0) {
     const double expected = view_.focal_baseline / z_predicted;
     const double expected_variance = square(expected / z_predicted) * target.space.position_covariance()(2, 2);
     const double step_d = expected / z_predicted * target.space.velocity().z() * dt_ * 0.5;
-    in_depth =
+    pair.offset_disparity = detection.disparity - expected;
+    pair.cost.depth =
         square(detection.disparity - expected) / (expected_variance + square(detection.disparity_sd) + square(step_d) +
                                                   square(0.5 * detection.disparity_reach) + 0.25);
-    if (!(in_depth <= limit)) return Assignment::kForbidden;
+    pair.cost.gate = PairCost::Gate::kDepth;
+    if (!(pair.cost.depth <= limit)) return pair;
   }
+  pair.cost.gate = PairCost::Gate::kOpen;
   const double ratio = detection.area > target.area ? detection.area / target.area : target.area / detection.area;
-  const double in_size = std::min(square((ratio - 1) / kAreaRatioSd), kMostSoftCost);
+  pair.cost.size = std::min(square((ratio - 1) / kAreaRatioSd), kMostSoftCost);
   const double part = detection.area / std::max(target.area, 1.0);
   const double strange = std::max(1 - target.appearance.explains(detection.appearance, part) - kUsualStrange, 0.0);
-  const double in_colour = std::min(square(strange / kStrangeSd), kMostColourCost);
-  double in_features = 0;
+  pair.cost.looks = std::min(square(strange / kStrangeSd), kMostColourCost);
   if (target.features.size() >= kVoters) {
     int inside = 0;
     for (const Features::Feature& feature : target.features) {
@@ -226,9 +229,64 @@ double Tracker::cost(const Target& target, const Detection& detection) const noe
                     ? 1
                     : 0;
     }
-    in_features = kFeatureCost * (1 - inside / static_cast<double>(target.features.size()));
+    pair.cost.corners = kFeatureCost * (1 - inside / static_cast<double>(target.features.size()));
   }
-  return in_picture + in_depth + in_size + in_features + in_colour;
+  return pair;
+}
+
+void Tracker::tell_pair(Decision::Kind kind, const Target& target, std::size_t detection,
+                        const Weighed& pair) const noexcept {
+  if (observer_.decided == nullptr) return;
+  Decision said;
+  said.kind = kind;
+  said.id = target.id;
+  said.detection = static_cast<std::uint16_t>(detection + 1);
+  said.cost = pair.cost;
+  said.offset_x = pair.offset.x();
+  said.offset_y = pair.offset.y();
+  said.sd_x = pair.offset_sd.x();
+  said.sd_y = pair.offset_sd.y();
+  said.offset_disparity = pair.offset_disparity;
+  said.limit = cost_limit();
+  observer_.tell(said);
+}
+
+void Tracker::tell(Decision::Kind kind, const Target& target, std::uint32_t other) const noexcept {
+  if (observer_.decided == nullptr) return;
+  Decision said;
+  said.kind = kind;
+  said.id = target.id;
+  said.other = other;
+  said.detection = target.label;
+  said.unseen_s = target.unseen_s;
+  said.limit_s = coast_limit_s(target);
+  said.hits = target.hits;
+  said.evidence = target.evidence;
+  said.way_px = target.way_px;
+  said.path_px = target.path_px;
+  observer_.tell(said);
+}
+
+void Tracker::tell_took(const Target& target, Taken how) const noexcept {
+  if (observer_.decided == nullptr) return;
+  Decision said;
+  said.kind = Decision::Kind::kTook;
+  said.id = target.id;
+  said.detection = target.label;
+  said.taken = how;
+  observer_.tell(said);
+}
+
+void Tracker::tell_removed(const Target& target, Removal why, std::uint32_t other) const noexcept {
+  if (observer_.decided == nullptr) return;
+  Decision said;
+  said.kind = Decision::Kind::kRemoved;
+  said.id = target.id;
+  said.other = other;
+  said.removal = why;
+  said.unseen_s = target.unseen_s;
+  said.limit_s = coast_limit_s(target);
+  observer_.tell(said);
 }
 
 // Solves targets against detections that both are still free, and hands the pairs on.
@@ -265,10 +323,16 @@ void Tracker::assign(std::span<const Detection> detections, double alone, Wanted
 void Tracker::associate(std::span<const Detection> detections, bool confirmed) noexcept {
   // A pair may be as far apart as the gate, or look somewhat different, but not both.
   assign(
-      detections, square(config_.gate) + kStranger,
+      detections, cost_limit(),
       [=](const Target& target) { return (target.state != TrackState::kTentative) == confirmed; },
-      [this](const Target& target, const Detection& detection) { return cost(target, detection); },
-      [this](Target& target, const Detection& detection, std::uint16_t label) { measure(target, detection, label); });
+      [this, detections](const Target& target, const Detection& detection) {
+        const Weighed pair = weigh(target, detection);
+        tell_pair(Decision::Kind::kWeighed, target, static_cast<std::size_t>(&detection - detections.data()), pair);
+        return pair.cost.sum();
+      },
+      [this](Target& target, const Detection& detection, std::uint16_t label) {
+        measure(target, detection, label, Taken::kAssociated);
+      });
 }
 
 // Whether it was measured where the target cannot be.
@@ -305,12 +369,12 @@ double Tracker::overlap_cost(const Target& target, const Detection& detection) c
   return common >= kOverlapPart ? 1 - common : Assignment::kForbidden;
 }
 
-void Tracker::restart(Target& target, const Detection& detection, std::uint16_t label) noexcept {
+void Tracker::restart(Target& target, const Detection& detection, std::uint16_t label, Taken how) noexcept {
   const Vector2 now(detection.centre_x(), detection.centre_y());
   const Vector2 way = now - Vector2(target.last_x, target.last_y);
   target.image.start(now, centre_noise(config_, detection.box), config_.initial_speed * view_.focal * kRecoverSpeed,
                      way / std::max(target.unseen_s, 1e-3));
-  measure(target, detection, label);
+  measure(target, detection, label, how);
 }
 
 void Tracker::recover(std::span<const Detection> detections) noexcept {
@@ -319,7 +383,10 @@ void Tracker::recover(std::span<const Detection> detections) noexcept {
       [this](const Target& target, const Detection& detection) {
         return std::min(recovery_cost(target, detection), overlap_cost(target, detection));
       },
-      [this](Target& target, const Detection& detection, std::uint16_t label) { restart(target, detection, label); });
+      [this](Target& target, const Detection& detection, std::uint16_t label) {
+        const bool near = recovery_cost(target, detection) <= overlap_cost(target, detection);
+        restart(target, detection, label, near ? Taken::kRecovered : Taken::kOverlapped);
+      });
 }
 
 bool Tracker::is_large(const Rect& box) const noexcept {
@@ -356,7 +423,8 @@ void Tracker::take_over(std::span<const Detection> detections) noexcept {
     target.has_depth = heir->has_depth;
     target.space = heir->space;
     target.features = heir->features;
-    restart(target, detections[heir->label - 1U], heir->label);
+    restart(target, detections[heir->label - 1U], heir->label, Taken::kInherited);
+    tell_removed(*heir, Removal::kInherited, target.id);
     heir->hits = 0;
   }
   keep_targets([](const Target& target) { return target.hits > 0; });
@@ -378,8 +446,9 @@ void Tracker::follow_parent(Target& target) noexcept {
   if (apart || target.attached_frames > kTrialFrames) target.parent = 0;
 }
 
-void Tracker::measure(Target& target, const Detection& detection, std::uint16_t label) noexcept {
+void Tracker::measure(Target& target, const Detection& detection, std::uint16_t label, Taken how) noexcept {
   target.label = label;
+  tell_took(target, how);
   const Vector2 z = centre(target, detection);
   (void)target.image.update(z, centre_noise(config_, detection.box));
   if (sees_depth(target, detection)) {
@@ -430,8 +499,11 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   if (target.state == TrackState::kTentative && target.hits >= config_.confirm_hits &&
       target.evidence >= config_.confirm_evidence && target.parent == 0 && got_somewhere(target)) {
     target.state = TrackState::kConfirmed;
+    tell(Decision::Kind::kConfirmed, target);
   } else if (target.state == TrackState::kCoasting) {
     target.state = TrackState::kConfirmed;
+  } else if (target.state == TrackState::kTentative) {
+    tell(Decision::Kind::kWaits, target, target.parent);
   }
 }
 
@@ -460,6 +532,7 @@ void Tracker::miss(Target& target) noexcept {
   if (target.state == TrackState::kConfirmed) target.state = TrackState::kCoasting;
   target.box = intersect(expected_box(target), {0, 0, view_.width, view_.height});
   target.hull.clear();
+  tell(Decision::Kind::kMissed, target);
 }
 
 void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
@@ -501,8 +574,10 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
     target.state = TrackState::kConfirmed;
   if (targets_.push(target)) {
     ++next_id_;
+    tell(Decision::Kind::kBorn, target, target.parent);
   } else {
     ++refused_;
+    tell(Decision::Kind::kNoRoom, target);
   }
 }
 
@@ -550,10 +625,12 @@ void Tracker::follow_twin(Target& target) noexcept {
 
 void Tracker::drop_twins() noexcept {
   for (Target& target : targets_) follow_twin(target);
-  keep_targets([](const Target& target) {
+  keep_targets([this](const Target& target) {
     const double way = (target.image.position() - Vector2(target.twin_from_x, target.twin_from_y)).norm();
     const bool together = way >= kTwinWay * std::max(target.width, target.height);
-    return target.twin_frames < (together ? kTwinFrames : kTwinStill);
+    const bool apart = target.twin_frames < (together ? kTwinFrames : kTwinStill);
+    if (!apart) tell_removed(target, Removal::kTwin, target.twin);
+    return apart;
   });
 }
 
@@ -563,13 +640,22 @@ bool Tracker::got_somewhere(const Target& target) const noexcept {
   return std::abs(target.space.position().z() - target.first_distance) >= kApproachPart * target.first_distance;
 }
 
-bool Tracker::expired(const Target& target) const noexcept {
-  if (target.measured) return false;
-  if (target.state == TrackState::kTentative) return target.misses_in_a_row >= config_.tentative_misses;
-  // Nothing is predicted for much longer than it was seen.
-  const double trusted = kCoastAnyway + kCoastPart * target.hits * dt_;
-  return target.unseen_s > std::min(config_.coast_s, trusted) ||
-         static_cast<double>(target.box.area()) < kVisiblePart * target.width * target.height;
+double Tracker::cost_limit() const noexcept { return square(config_.gate) + kStranger; }
+
+// Nothing is predicted for much longer than it was seen.
+double Tracker::coast_limit_s(const Target& target) const noexcept {
+  return std::min(config_.coast_s, kCoastAnyway + kCoastPart * target.hits * dt_);
+}
+
+std::optional<Removal> Tracker::expired(const Target& target) const noexcept {
+  if (target.measured) return std::nullopt;
+  if (target.state == TrackState::kTentative) {
+    if (target.misses_in_a_row < config_.tentative_misses) return std::nullopt;
+    return Removal::kUnconfirmed;
+  }
+  if (target.unseen_s > coast_limit_s(target)) return Removal::kUnseen;
+  if (static_cast<double>(target.box.area()) < kVisiblePart * target.width * target.height) return Removal::kLeft;
+  return std::nullopt;
 }
 
 void Tracker::update(std::span<const Detection> detections, ImageView<const std::uint8_t> luma,
@@ -592,7 +678,11 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
   for (Target& target : targets_) {
     if (!target.measured) miss(target);
   }
-  keep_targets([this](const Target& target) { return !expired(target); });
+  keep_targets([this](const Target& target) {
+    const std::optional<Removal> why = expired(target);
+    if (why) tell_removed(target, *why);
+    return !why;
+  });
   for (std::size_t j = 0; j < detections.size(); ++j) {
     if (detection_used_[j] == 0) start(detections[j], static_cast<std::uint16_t>(j + 1));
   }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "pipeline/core/arena.hpp"
@@ -9,6 +10,7 @@
 #include "pipeline/core/result.hpp"
 #include "pipeline/core/stage.hpp"
 #include "pipeline/track/assignment.hpp"
+#include "pipeline/track/decision.hpp"
 #include "pipeline/track/detection.hpp"
 #include "pipeline/track/features.hpp"
 #include "pipeline/track/kalman.hpp"
@@ -97,6 +99,9 @@ class Tracker {
   /// All targets, confirmed, coasting and tentative, in the order of their ids.
   [[nodiscard]] std::span<const TrackReport> reports() const noexcept { return reports_.view(); }
 
+  /// Who is told of each decision from now on.
+  void observe(const DecisionObserver& observer) noexcept { observer_ = observer; }
+
   /// Detections that found no room for a new target, since the start.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
@@ -168,20 +173,33 @@ class Tracker {
   [[nodiscard]] static double centre_along(double expected, double size, int from, int to, int end) noexcept;
   [[nodiscard]] bool sees_depth(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] Eigen::Vector2d centre(const Target& target, const Detection& detection) const noexcept;
-  [[nodiscard]] double cost(const Target& target, const Detection& detection) const noexcept;
+  /// A pair weighed: its cost, and how far the detection is from where the target was expected.
+  struct Weighed {
+    PairCost cost;
+    Eigen::Vector2d offset = Eigen::Vector2d::Zero();     // [px]
+    Eigen::Vector2d offset_sd = Eigen::Vector2d::Zero();  // [px]
+    double offset_disparity = 0;                          // [px]
+  };
+  [[nodiscard]] Weighed weigh(const Target& target, const Detection& detection) const noexcept;
+  void tell_pair(Decision::Kind kind, const Target& target, std::size_t detection, const Weighed& pair) const noexcept;
+  void tell(Decision::Kind kind, const Target& target, std::uint32_t other = 0) const noexcept;
+  void tell_took(const Target& target, Taken how) const noexcept;
+  void tell_removed(const Target& target, Removal why, std::uint32_t other = 0) const noexcept;
+  [[nodiscard]] double cost_limit() const noexcept;
+  [[nodiscard]] double coast_limit_s(const Target& target) const noexcept;
   [[nodiscard]] bool is_at_other_depth(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double recovery_cost(const Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] double overlap_cost(const Target& target, const Detection& detection) const noexcept;
   template <class Wanted, class Cost, class Take>
   void assign(std::span<const Detection> detections, double alone, Wanted&& wanted, Cost&& cost, Take&& take) noexcept;
-  void restart(Target& target, const Detection& detection, std::uint16_t label) noexcept;
+  void restart(Target& target, const Detection& detection, std::uint16_t label, Taken how) noexcept;
   void recover(std::span<const Detection> detections) noexcept;
   [[nodiscard]] bool is_large(const Rect& box) const noexcept;
   [[nodiscard]] bool is_leaving(const Target& target) const noexcept;
   void take_over(std::span<const Detection> detections) noexcept;
   void follow_parent(Target& target) noexcept;
   void associate(std::span<const Detection> detections, bool confirmed) noexcept;
-  void measure(Target& target, const Detection& detection, std::uint16_t label) noexcept;
+  void measure(Target& target, const Detection& detection, std::uint16_t label, Taken how) noexcept;
   void renew_features(Target& target, ImageView<const std::uint8_t> luma,
                       ImageView<const std::uint16_t> labels) noexcept;
   void miss(Target& target) noexcept;
@@ -201,7 +219,7 @@ class Tracker {
     targets_.truncate(kept);
   }
   [[nodiscard]] bool got_somewhere(const Target& target) const noexcept;
-  [[nodiscard]] bool expired(const Target& target) const noexcept;
+  [[nodiscard]] std::optional<Removal> expired(const Target& target) const noexcept;
   void report() noexcept;
 
   explicit Tracker(const Features& features) noexcept : features_(features) {}
@@ -221,6 +239,7 @@ class Tracker {
   std::span<unsigned char> detection_used_;
   Assignment assignment_;
   Features features_;
+  DecisionObserver observer_;
 };
 static_assert(RealTimeStage<Tracker, &Tracker::predict, &Tracker::update, &Tracker::reports>);
 

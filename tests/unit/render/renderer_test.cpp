@@ -60,7 +60,7 @@ class RendererTest : public ::testing::Test {
     Scene scene(stereo);
     for (int i = 1; i <= frames; ++i) {
       scene.go_to(static_cast<std::uint64_t>(i));
-      renderer.draw(scene.pair(), scene.result());
+      renderer.draw(scene.pair(), scene.result(), nullptr);
     }
   }
   std::set<std::string> names(const fs::path& below = "") const {

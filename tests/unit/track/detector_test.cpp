@@ -104,6 +104,7 @@ class DetectorOf : public testing::Test {
     in.y = view(y_);
     in.strength = view(strength_);
     in.predictions = predictions;
+    in.observer = {nullptr, &DetectorOf::told, this};
     return in;
   }
   std::span<const Detection> run(const std::vector<Prediction>& predictions = {}, bool stereo = true) {
@@ -111,6 +112,10 @@ class DetectorOf : public testing::Test {
     (void)detector_->segment(in);
     return detector_->conclude(in);
   }
+  static void told(void* self, const RejectedCandidate& candidate) noexcept {
+    static_cast<DetectorOf*>(self)->told_.push_back(candidate);
+  }
+  std::vector<RejectedCandidate> told_;  ///< by the observer
   [[nodiscard]] std::uint32_t rejected(Rejection why) const {
     return detector_->rejections()[static_cast<std::size_t>(why)];
   }
@@ -181,6 +186,10 @@ TEST_F(DetectorOf, TooSmallIsRejectedAndCounted) {
   EXPECT_EQ(found[0].area, 24);
   EXPECT_EQ(rejected(Rejection::kSmall), 1U);
   EXPECT_EQ(rejected(), 1U);
+  ASSERT_EQ(told_.size(), 1U);
+  EXPECT_EQ(told_[0].why, Rejection::kSmall);
+  EXPECT_EQ(told_[0].box, (Rect{60, 60, 23, 1}));
+  EXPECT_EQ(told_[0].area, 23);
 }
 
 TEST_F(DetectorOf, SmallestAreaGrowsWithThePicture) {

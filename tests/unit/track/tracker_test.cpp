@@ -859,6 +859,95 @@ TEST_F(TrackerOf, FeaturesVoteForTheDetectionInWhoseBoxTheyLie) {
   }
 }
 
+/// What an observer was told, frame by frame.
+class TrackerTells : public TrackerOf {
+ protected:
+  void SetUp() override {
+    make(config());
+    tracker_->observe({&TrackerTells::decided, nullptr, this});
+  }
+  static void decided(void* self, const Decision& decision) noexcept {
+    static_cast<TrackerTells*>(self)->told_.push_back(decision);
+  }
+  /// Steps, and answers what was told of the target but pairs weighed.
+  std::vector<Decision> told_of(std::uint32_t id, const std::vector<Detection>& detections) {
+    told_.clear();
+    step(detections);
+    std::vector<Decision> of_it;
+    for (const Decision& one : told_) {
+      if (one.id == id && one.kind != Decision::Kind::kWeighed) of_it.push_back(one);
+    }
+    return of_it;
+  }
+  std::vector<Decision> told_;
+};
+using Kind = Decision::Kind;
+
+TEST_F(TrackerTells, WhatATargetWaitsForAndWhatConfirmsIt) {
+  std::vector<Decision> told = told_of(1, {seen_at(100, 200, 20)});
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].kind, Kind::kBorn);
+  EXPECT_EQ(told[0].detection, 1);
+  told = told_of(1, {seen_at(106, 200, 20)});
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[0].kind, Kind::kTook);
+  EXPECT_EQ(told[0].taken, Taken::kAssociated);
+  EXPECT_EQ(told[1].kind, Kind::kWaits);
+  EXPECT_EQ(told[1].hits, 2);
+  told = told_of(1, {seen_at(112, 200, 20)});
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].kind, Kind::kConfirmed);
+  EXPECT_NEAR(told[1].way_px, 12, 1e-9);
+}
+
+TEST_F(TrackerTells, HowLongItCoastsAndThatItIsGone) {
+  for (int i = 0; i < 40; ++i) (void)told_of(1, {seen_at(100 + 2 * i, 200)});
+  const double limit = config().coast_s;
+  bool removed = false;
+  for (int i = 1; i < 60 && !removed; ++i) {
+    const std::vector<Decision> told = told_of(1, {});
+    ASSERT_FALSE(told.empty());
+    EXPECT_EQ(told[0].kind, Kind::kMissed);
+    EXPECT_NEAR(told[0].unseen_s, i * kDt, 1e-9);
+    EXPECT_LE(told[0].limit_s, limit);
+    if (told.size() < 2) continue;
+    removed = true;
+    EXPECT_EQ(told[1].kind, Kind::kRemoved);
+    EXPECT_EQ(told[1].removal, Removal::kUnseen);
+    EXPECT_GT(told[1].unseen_s, told[1].limit_s);
+  }
+  EXPECT_TRUE(removed);
+  EXPECT_EQ(with_id(1), nullptr);
+}
+
+TEST_F(TrackerTells, ATentativeOneThatIsNotSeenAgain) {
+  (void)told_of(1, {seen_at(100, 200)});
+  (void)told_of(1, {});
+  const std::vector<Decision> told = told_of(1, {});
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].kind, Kind::kRemoved);
+  EXPECT_EQ(told[1].removal, Removal::kUnconfirmed);
+}
+
+TEST_F(TrackerTells, WhichGateForbadeAPair) {
+  for (int i = 0; i < 12; ++i) (void)told_of(1, {seen_at(100 + 2 * i, 200, 20)});
+  (void)told_of(1, {seen_at(124, 200, 20), seen_at(500, 200, 20), seen_at(126, 200, 40)});
+  const auto pair = [this](int detection) {
+    const auto found = std::find_if(told_.begin(), told_.end(), [&](const Decision& one) {
+      return one.id == 1 && one.kind == Kind::kWeighed && one.detection == detection;
+    });
+    EXPECT_NE(found, told_.end()) << detection;
+    return found == told_.end() ? Decision{} : *found;
+  };
+  EXPECT_EQ(pair(1).cost.gate, PairCost::Gate::kOpen);
+  EXPECT_LT(pair(1).cost.sum(), pair(1).limit);
+  EXPECT_EQ(pair(2).cost.gate, PairCost::Gate::kPicture);
+  EXPECT_GT(pair(2).offset_x, 300);
+  EXPECT_EQ(pair(3).cost.gate, PairCost::Gate::kDepth);
+  EXPECT_NEAR(pair(3).offset_disparity, 20, 2);
+  EXPECT_TRUE(std::isinf(pair(3).cost.sum()));
+}
+
 TEST(Tracker, Faults) {
   Arena arena;
   const double nan = std::numeric_limits<double>::quiet_NaN();
