@@ -40,18 +40,18 @@ namespace stereotrack::capture {
 ///   service thread once no slot names its buffers; tend() destroys it, opens another, with back-off, and hands that
 ///   one over. The daemon goes on meanwhile, whatever is gone;
 /// * silence counts from the first frame that came from any camera on. Where frames come `triggered`, both silent is no
-///   fault of theirs: it is told, and they are kept;
+///   fault of theirs: it is told, and they are kept; one is at fault that is asked, by pulses or the other one's
+///   frames, for half of `timeout` without a pause of all of it;
 /// * both deliver and no two fit for `timeout`: likewise mono, until two fit. Late right frames make it more patient;
 /// * with a trigger::Trigger, frames are counted against its pulses, and the number of a frame's pulse is what two must
 ///   have in common: a missed or doubled exposure breaks no pair. Frames that no pulse asked for are given back. While
 ///   no pulse is told and frames come, they pair without;
 /// * no frame answers a pulse for `timeout`: the cameras do not follow the trigger, or with another delay. Frames pair
 ///   without pulses, until AnswerWatch::kConvincing in a row of a camera answer one;
-/// * one camera answers and the other does not, for `timeout`, or with a third of its frames only
-/// (trigger::AnswerWatch:
-///   its wire is off, it runs free): as if it were lost, but it is kept. It is named; without the right one left
-///   pictures go on in mono, without the left one no pair comes; its frames are given back, whatever they would fit,
-///   until it is believed again;
+/// * one camera answers and the other does not, or with under two thirds of its frames (trigger::AnswerWatch: its wire
+///   is off, it runs free): as if it were lost, but it is kept. It is named; without the right one left pictures go on
+///   in mono, without the left one no pair comes; its frames are given back, whatever they would fit, until it is
+///   believed again;
 /// * a left frame, whose time is its pair's, bears one after its arrival: told once a camera; no result leaves on time;
 /// * a camera that comes back and delivers another size or format is refused;
 /// * two that nobody triggers and that are to `steer`: tend() holds the right one's rate to the left one's
