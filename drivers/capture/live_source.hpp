@@ -48,6 +48,8 @@ struct CameraFigures {
   std::uint64_t missed = 0;         ///< trigger::PulseMatcher::Counters, these three
   std::uint64_t doubled = 0;
   std::uint64_t stray = 0;
+  bool astray = false;            ///< now: frames come, and answer no pulse of the trigger
+  std::uint64_t strayings = 0;    ///< times that it was astray alone
   std::uint64_t back_off_ms = 0;  ///< now: between two attempts; 0: none is wanted
 };
 
@@ -76,7 +78,7 @@ struct SourceFigures {
   std::uint64_t waiting_high = 0;
   bool has_trigger = false;                       ///< pulses are told
   bool trigger_silent = false;                    ///< now: frames come, and no pulses
-  bool trigger_unanswered = false;                ///< now: frames come, and answer no pulse
+  bool trigger_unanswered = false;                ///< now: frames come, and neither camera's answer a pulse
   std::uint64_t pulses = 0;                       ///< number of the last one
   std::uint64_t pulses_lost = 0;                  ///< known to have been, and not told
   std::uint64_t mono_pairs = 0;                   ///< put with an empty right picture

@@ -53,6 +53,8 @@ enum Health : std::uint32_t {
   kHealthTriggerFailed = 4096,
   kHealthAllocated = 8192,
   kHealthHot = 16384,
+  kHealthLeftAstray = 32768,
+  kHealthRightAstray = 65536,
 };
 
 /// What only a live rig knows about a pair; a replay has none. With a status: about now, without skew and exposures.

@@ -48,7 +48,9 @@ static_assert(same(stereotrack_Health_HEALTH_NO_PAIRS, kHealthNoPairs) &&
               same(stereotrack_Health_HEALTH_NOT_REAL_TIME, kHealthNotRealTime) &&
               same(stereotrack_Health_HEALTH_TRIGGER_FAILED, kHealthTriggerFailed) &&
               same(stereotrack_Health_HEALTH_ALLOCATED, kHealthAllocated) &&
-              same(stereotrack_Health_HEALTH_HOT, kHealthHot));
+              same(stereotrack_Health_HEALTH_HOT, kHealthHot) &&
+              same(stereotrack_Health_HEALTH_LEFT_ASTRAY, kHealthLeftAstray) &&
+              same(stereotrack_Health_HEALTH_RIGHT_ASTRAY, kHealthRightAstray));
 
 /// Writes `value` as float32; false if that is not finite.
 bool put(double value, float& out) noexcept {

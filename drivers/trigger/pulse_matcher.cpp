@@ -43,16 +43,16 @@ PulseMatcher::Found PulseMatcher::frame(Side side, CaptureTime begin) noexcept {
   const std::chrono::nanoseconds off = nearest == nullptr ? std::chrono::nanoseconds(0) : begin - nearest->begin;
   if (nearest == nullptr || std::chrono::abs(off) > tolerance_) {
     ++counters_[s].stray;
-    return {Kind::kStray, 0, off};
+    return {Kind::kStray, 0, off, nearest != nullptr && std::chrono::abs(off) <= config_.period};
   }
   if (nearest->answered[s]) {
     ++counters_[s].doubled;
-    return {Kind::kDoubled, nearest->number, off};
+    return {Kind::kDoubled, nearest->number, off, true};
   }
   miss_before(s, nearest->number);
   nearest->answered[s] = nearest->settled[s] = true;
   ++counters_[s].answered;
-  return {Kind::kAnswer, nearest->number, off};
+  return {Kind::kAnswer, nearest->number, off, true};
 }
 
 void PulseMatcher::restart(Side side) noexcept {

@@ -42,6 +42,7 @@ class PulseMatcher {
     Kind kind = Kind::kStray;
     std::uint64_t number = 0;         ///< of the pulse; 0: kStray
     std::chrono::nanoseconds off{0};  ///< by how much it began later than the nearest pulse asks for; 0: none is known
+    bool between = false;             ///< pulses: that is a period at most; else those of its time are forgotten
   };
 
   /// Of one side, since the start.

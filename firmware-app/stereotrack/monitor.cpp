@@ -83,7 +83,7 @@ std::string flag_names(std::uint32_t flags) {
 }
 
 std::string health_names(std::uint32_t health) {
-  static constexpr std::array<BitName, 15> kNames{{
+  static constexpr std::array<BitName, 17> kNames{{
       {telemetry::kHealthNoPairs, "no-pairs"},
       {telemetry::kHealthLeftSilent, "left-silent"},
       {telemetry::kHealthRightSilent, "right-silent"},
@@ -99,6 +99,8 @@ std::string health_names(std::uint32_t health) {
       {telemetry::kHealthTriggerFailed, "trigger-failed"},
       {telemetry::kHealthAllocated, "allocated"},
       {telemetry::kHealthHot, "hot"},
+      {telemetry::kHealthLeftAstray, "left-astray"},
+      {telemetry::kHealthRightAstray, "right-astray"},
   }};
   return health == 0 ? "good" : bit_names(health, kNames);
 }

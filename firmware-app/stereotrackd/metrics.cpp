@@ -112,7 +112,13 @@ void add_cameras(Text& text, const capture::SourceFigures& figures) {
     text.counter("trigger_pulses_lost_total", "Pulses that are known to have been, and were not told.",
                  figures.pulses_lost);
     text.gauge("trigger_silent", "1: frames come, and no pulses.", figures.trigger_silent ? 1 : 0);
-    text.gauge("trigger_unanswered", "1: frames come, and answer no pulse.", figures.trigger_unanswered ? 1 : 0);
+    text.gauge("trigger_unanswered", "1: frames come, and neither camera's answer a pulse.",
+               figures.trigger_unanswered ? 1 : 0);
+    text.family("camera_astray", "gauge", "1: its frames come, and answer no pulse.");
+    text.value("{camera=\"left\"}", figures.cameras[0].astray ? 1 : 0);
+    text.value("{camera=\"right\"}", figures.cameras[1].astray ? 1 : 0);
+    text.family("camera_strayings_total", "counter", "Times that its frames answered no pulse, and the other's did.");
+    of_each("", &F::strayings);
     text.family("camera_exposures_total", "counter", "Exposures that do not fit the pulses, by reason.");
     of_each(",fault=\"missed\"", &F::missed);
     of_each(",fault=\"doubled\"", &F::doubled);

@@ -309,7 +309,11 @@ void Publisher::judge_health() noexcept {
   cameras_ = source_.figures();
   tell_if(cameras_.cameras[0].silent, telemetry::kHealthLeftSilent);
   tell_if(cameras_.cameras[1].silent, telemetry::kHealthRightSilent);
-  tell_if(cameras_.trigger_silent || cameras_.trigger_unanswered || trigger_fails(), telemetry::kHealthTriggerFailed);
+  const bool left_astray = cameras_.cameras[0].astray;
+  const bool right_astray = cameras_.cameras[1].astray;
+  tell_if(cameras_.trigger_silent || left_astray || right_astray || trigger_fails(), telemetry::kHealthTriggerFailed);
+  tell_if(left_astray, telemetry::kHealthLeftAstray);
+  tell_if(right_astray, telemetry::kHealthRightAstray);
   tell_if(vitals_.skew_over.get() != skew_over_seen_, telemetry::kHealthSkew);
   tell_if(vitals_.exposures_differ.get() != exposures_differ_seen_, telemetry::kHealthExposuresDiffer);
   skew_over_seen_ = vitals_.skew_over.get();

@@ -55,6 +55,9 @@ class CameraScene {
   /// The next pulse finds the right camera asleep.
   void miss_one() { misses_.store(true); }
 
+  /// The trigger's wire to that camera is off: it runs free, and exposes when no pulse asks for it.
+  void unwire(Side side, bool is_off) { unwired_[static_cast<std::size_t>(side)].store(is_off); }
+
   void unplug(Side side) {
     sensor(side).refuse(sensor(side).info().name + ": is not there");
     sensor(side).lose();
@@ -132,11 +135,15 @@ class CameraScene {
         std::copy_n(picture.data, picture_bytes(picture.format, picture.width, picture.height), pixels);
       };
     };
-    (void)left_.expose({.number = number, .time = time, .sequence = number, .settings = {kLeftExposure, 1.0F}},
-                       paint(pair.left));
+    const auto ahead = [&](Side side) {
+      return unwired_[static_cast<std::size_t>(side)].load() ? -period_ / 2 : std::chrono::nanoseconds(0);
+    };
+    (void)left_.expose(
+        {.number = number, .time = time + ahead(Side::kLeft), .sequence = number, .settings = {kLeftExposure, 1.0F}},
+        paint(pair.left));
     if (!with_right) return;
     (void)right_.expose({.number = number,
-                         .time = time + std::chrono::nanoseconds(skew_ns_.load()),
+                         .time = time + ahead(Side::kRight) + std::chrono::nanoseconds(skew_ns_.load()),
                          .sequence = number,
                          .settings = {std::chrono::nanoseconds(right_exposure_ns_.load()), 1.0F}},
                         paint(pair.right));
@@ -150,6 +157,7 @@ class CameraScene {
   std::atomic<std::int64_t> skew_ns_{0};
   std::atomic<std::int64_t> right_exposure_ns_{kLeftExposure.count()};
   std::atomic<bool> misses_{false};
+  std::array<std::atomic<bool>, 2> unwired_{};
   std::unique_ptr<trigger::Trigger> pulses_;
   std::thread thread_;
 };

@@ -40,6 +40,22 @@ std::string seconds_text(std::chrono::nanoseconds span) {
   return text;
 }
 
+std::string off_text(std::chrono::nanoseconds off) {
+  return std::to_string(std::chrono::abs(off).count() / 1000) + (off.count() < 0 ? " us before" : " us after") +
+         " the nearest";
+}
+
+SourceNote astray_note(Side side, std::chrono::nanoseconds off, std::uint32_t frames, std::uint32_t unanswered) {
+  const std::string of = std::to_string(frames);
+  return {SourceNote::Weight::kError, "camera_astray", name_of(side),
+          std::string(name_of(side)) + " camera: " +
+              (unanswered == frames ? of + " frames, none answers a pulse"
+                                    : std::to_string(unanswered) + " of " + of + " frames answer no pulse") +
+              ", the last one began " + off_text(off) + ", and the " + name_of(other(side)) + " one's do; " +
+              (side == Side::kRight ? "goes on in mono" : "outputs are predicted until it follows") +
+              ": check the trigger's wire to it, and that it is set to expose on a pulse"};
+}
+
 void add(Counter& to, std::uint64_t before, std::uint64_t now) noexcept { to.set(before + now); }
 
 }  // namespace
@@ -197,9 +213,13 @@ void StereoCameras::adopt(PairOutlet& outlet) noexcept {
     each.late_comer = true;
     each.heard.reset();
     each.joined = now();
+    each.asked = each.last_asked = each.joined;
     settle(outlet, pairer_->restart());
     pairer_->set_sequenced(pulses_trusted_ || both_count());
     if (matcher_) matcher_->restart(side);
+    each.watch = trigger::AnswerWatch();
+    each.watch.begin(each.joined);
+    if (trigger_unanswered_.load(std::memory_order_relaxed)) each.watch.go_astray();
     (void)distances_.push({CaptureTime(), {}, true});
     // What fits has to show first; until then left pictures go on alone.
     unmatched_ = true;
@@ -217,11 +237,20 @@ bool StereoCameras::both_count() const noexcept {
 void StereoCameras::trust_pulses(PairOutlet& outlet, bool trust) noexcept {
   if (trust == pulses_trusted_) return;
   pulses_trusted_ = trust;
-  last_answer_ = now();
+  for (Eye& each : eyes_) {
+    if (!each.watch.is_astray()) each.watch.begin(now());
+  }
   // Numbers of pulses and of frames do not compare: what fits has to show anew.
   settle(outlet, pairer_->restart());
   last_pair_ = now();
   pairer_->set_sequenced(trust || both_count());
+}
+
+/// A frame is due from it: a pulse was told, or the other one has delivered.
+void StereoCameras::ask(Side side, MonotonicTime at) noexcept {
+  Eye& each = eye(side);
+  if (at - each.last_asked > config_.timeout) each.asked = at;  // after a pause
+  each.last_asked = at;
 }
 
 void StereoCameras::take_pulses(PairOutlet& outlet) noexcept {
@@ -229,6 +258,7 @@ void StereoCameras::take_pulses(PairOutlet& outlet) noexcept {
   while (trigger_ && trigger_->take(pulse)) {
     false_alarms_ = 0;
     last_pulse_ = now();
+    for (const Side side : kSides) ask(side, last_pulse_);
     if (!armed_) armed_ = last_pair_ = last_pulse_;
     matcher_->pulse(pulse.number, CaptureTime(pulse.time.time_since_epoch()));
     pulses_.set(matcher_->pulses());
@@ -247,44 +277,88 @@ void StereoCameras::look_for_pulses(PairOutlet& outlet, MonotonicTime now) noexc
       eyes_.begin(), eyes_.end(), [&](const Eye& each) { return each.heard && *each.heard - since > config_.timeout; });
   if (!frames_come) return;
   trigger_silent_.store(true, std::memory_order_relaxed);
+  for (Eye& each : eyes_) each.watch.begin(now);  // what none is told of nobody can answer
   trust_pulses(outlet, false);
   tell(Change::kNoPulses, Side::kLeft, now - since);
 }
 
-/// Frames come and pulses, and have nothing to do with each other.
+bool StereoCameras::is_astray(Side side) const noexcept {
+  return pulses_trusted_ && eyes_[static_cast<std::size_t>(side)].watch.is_astray();
+}
+
+/// Of either camera.
+MonotonicTime StereoCameras::last_answer() const noexcept {
+  return std::max(eyes_[0].watch.last_answer(), eyes_[1].watch.last_answer());
+}
+
+void StereoCameras::call_astray(Side side) noexcept {
+  Eye& each = eye(side);
+  each.strayings.add();
+  (void)events_.push({Change::kAstray, side, each.watch.off(), each.watch.frames(), each.watch.unanswered()});
+  each.watch.go_astray();
+}
+
+/// Frames come and pulses, and those of both cameras, or of one, have nothing to do with them.
 void StereoCameras::look_for_answers(PairOutlet& outlet) noexcept {
   if (!pulses_trusted_) return;
-  const bool frames_come = std::any_of(eyes_.begin(), eyes_.end(), [&](const Eye& each) {
-    return each.heard && *each.heard - last_answer_ > config_.timeout;
-  });
-  if (!frames_come || last_pulse_ - last_answer_ <= config_.timeout / 2) return;
-  trigger_unanswered_.store(true, std::memory_order_relaxed);
-  answers_in_row_ = 0;
-  tell(Change::kNoAnswers, Side::kLeft, off_);
-  trust_pulses(outlet, false);
+  const MonotonicTime last = last_answer();
+  const auto strays = [&](const Eye& each, MonotonicTime since) {
+    return each.camera && !each.ending && !each.watch.is_astray() && each.heard &&
+           *each.heard - since > config_.timeout && each.watch.unanswered_in_row() >= trigger::AnswerWatch::kFewest;
+  };
+  const auto* neither = std::find_if(eyes_.begin(), eyes_.end(), [&](const Eye& each) { return strays(each, last); });
+  if (neither != eyes_.end() && last_pulse_ - last > config_.timeout / 2) {
+    trigger_unanswered_.store(true, std::memory_order_relaxed);
+    tell(Change::kNoAnswers, Side::kLeft, neither->watch.off());
+    for (Eye& each : eyes_) {
+      if (each.camera && !each.ending) each.watch.go_astray();
+    }
+    trust_pulses(outlet, false);
+    return;
+  }
+  if (!has_two() || is_out(Side::kLeft) || is_out(Side::kRight)) return;
+  for (const Side side : kSides) {
+    const Eye& each = eye(side);
+    const trigger::AnswerWatch& partner = eye(other(side)).watch;
+    if (each.watch.is_astray() || partner.is_astray()) continue;
+    const MonotonicTime since = each.watch.last_answer();
+    const bool none = strays(each, since) && partner.last_answer() - since > config_.timeout / 2;
+    if (none || (each.watch.mostly_strays() && !partner.mostly_strays())) call_astray(side);
+  }
+}
+
+/// It has answered often enough while it was astray.
+void StereoCameras::believe(PairOutlet& outlet, Side side) noexcept {
+  eye(side).watch.begin(now());
+  if (!trigger_unanswered_.load(std::memory_order_relaxed)) {
+    last_pair_ = now();
+    tell(Change::kFollows, side);
+    return;
+  }
+  // The other one is as far, but for its next frames, or is the one that does not follow.
+  Eye& partner = eye(other(side));
+  const bool has_to_show = partner.watch.frames() >= trigger::AnswerWatch::kFewest;
+  if (partner.watch.half_convinces() || !has_to_show) partner.watch.begin(now());
+  trigger_unanswered_.store(false, std::memory_order_relaxed);
+  tell(Change::kAnswers, Side::kLeft);
+  trust_pulses(outlet, true);
+  if (is_astray(other(side))) call_astray(other(side));
 }
 
 /// Whether a frame may go to the pairer, and by which number: that of its pulse, while pulses are trusted.
 bool StereoCameras::answers(PairOutlet& outlet, Side side, CaptureTime mid_exposure, const SensorFrame& frame,
                             std::uint64_t& sequence) noexcept {
-  const bool unanswered = trigger_unanswered_.load(std::memory_order_relaxed);
-  if (!matcher_ || !(pulses_trusted_ || unanswered)) return true;
+  if (!matcher_ || !(pulses_trusted_ || trigger_unanswered_.load(std::memory_order_relaxed))) return true;
   const CaptureTime begin = mid_exposure - frame.settings.exposure.value_or(config_.exposure) / 2;
   const trigger::PulseMatcher::Found found = matcher_->frame(side, begin);
   const bool is_answer = found.kind == trigger::PulseMatcher::Kind::kAnswer;
-  if (!is_answer) off_ = found.off;
-  answers_in_row_ = is_answer ? answers_in_row_ + 1 : 0;
-  if (unanswered) {
-    if (answers_in_row_ < kConvincing) return true;
-    trigger_unanswered_.store(false, std::memory_order_relaxed);
-    tell(Change::kAnswers, Side::kLeft);
-    trust_pulses(outlet, true);
-  }
-  if (is_answer) {
-    last_answer_ = now();
-    sequence = found.number;
-  }
-  return is_answer;
+  trigger::AnswerWatch& watch = eye(side).watch;
+  watch.frame(found, now());
+  if (watch.convinces()) believe(outlet, side);
+  if (trigger_unanswered_.load(std::memory_order_relaxed)) return true;
+  if (!is_answer || watch.is_astray()) return false;
+  sequence = found.number;
+  return true;
 }
 
 /// The camera is given up: nothing is taken from it any more. Its frames that wait for a partner are handed back.
@@ -295,6 +369,7 @@ void StereoCameras::end(PairOutlet& outlet, Side side, std::chrono::nanoseconds 
   each.retired_silence = silence;
   each.silent.store(true, std::memory_order_relaxed);
   each.losses.add();
+  each.watch.begin(now());
   settle(outlet, pairer_->restart());
 }
 
@@ -397,7 +472,10 @@ void StereoCameras::arrived(PairOutlet& outlet, Side side, const SensorFrame& fr
   if (!each.heard && each.late_comer) tell(Change::kHeard, side);
   // After a pause without triggers nothing can have fitted.
   if (each.heard && at - *each.heard > config_.timeout) last_pair_ = at;
+  if (!each.heard && !each.watch.is_astray()) each.watch.begin(at);
   each.heard = at;
+  each.asked = each.last_asked = at;
+  ask(other(side), at);
   each.silent.store(false, std::memory_order_relaxed);
   each.settings[frame.buffer] = frame.settings;
   const CaptureTime time(each.camera->clock_map().to_monotonic(frame.mid_exposure).time_since_epoch());
@@ -416,7 +494,7 @@ void StereoCameras::arrived(PairOutlet& outlet, Side side, const SensorFrame& fr
     return;
   }
   settle(outlet, pairer_->push(side, {time, sequence, frame.buffer}));
-  if (is_out(other(side))) {
+  if (is_out(other(side)) || is_astray(other(side))) {
     settle(outlet, pairer_->give_up_before(time + std::chrono::nanoseconds(1)));
     return;
   }
@@ -458,15 +536,13 @@ void StereoCameras::look_for_silence(PairOutlet& outlet, MonotonicTime now) noex
     Eye& each = eye(side);
     if (!each.camera || each.ending) continue;
     ++there;
-    const Eye& partner = eye(other(side));
     const MonotonicTime since = each.heard ? *each.heard : std::max(each.joined, *armed_) + kStartUp;
     if (now - since <= config_.timeout) continue;
     ++quiet_ones;
     longest = std::max(longest, now - since);
-    // Frames that the other one had meanwhile were triggered, as pulses say themselves; this one missed them.
-    const bool others =
-        partner.camera && !partner.ending && partner.heard && *partner.heard - since > config_.timeout / 2;
-    const bool alone = others || (matcher_ && last_pulse_ - since > config_.timeout / 2);
+    // Frames that the other one had meanwhile were triggered, as pulses say themselves; this one missed them. After a
+    // pause the first of either says nothing: its own frame is on its way.
+    const bool alone = each.last_asked - std::max(since, each.asked) > config_.timeout / 2;
     if (config_.triggered && !alone) {
       each.silent.store(true, std::memory_order_relaxed);
     } else {
@@ -483,7 +559,10 @@ void StereoCameras::look_for_fits(MonotonicTime now) noexcept {
   const Eye& left = eye(Side::kLeft);
   const Eye& right = eye(Side::kRight);
   if (unmatched_is_told_ || is_out(Side::kLeft) || is_out(Side::kRight) || !left.heard || !right.heard) return;
-  if (std::min({*left.heard, *right.heard, now}) - last_pair_ <= config_.timeout) return;
+  // While pulses are trusted, only what answers them can fit.
+  const MonotonicTime left_had = pulses_trusted_ ? left.watch.last_answer() : *left.heard;
+  const MonotonicTime right_had = pulses_trusted_ ? right.watch.last_answer() : *right.heard;
+  if (std::min({left_had, right_had, now}) - last_pair_ <= config_.timeout) return;
   unmatched_ = unmatched_is_told_ = true;
   const std::chrono::nanoseconds apart = (right.last - left.last) % info_.period;
   const bool folds = std::chrono::abs(apart) > info_.period / 2;
@@ -503,6 +582,7 @@ void StereoCameras::count() noexcept {
     each.missed.set(exposures.missed);
     each.doubled.set(exposures.doubled);
     each.stray.set(exposures.stray);
+    each.astray.store(each.watch.is_astray(), std::memory_order_relaxed);
   }
   const trigger::Pairer::Counters& c = pairer_->counters();
   const std::array<std::uint64_t, 9> pairing{c.paired,    c.missing_left, c.missing_right,
@@ -580,13 +660,17 @@ void StereoCameras::say(const Event& event, std::vector<SourceNote>& notes) {
       break;
     case Change::kNoAnswers:
       notes.push_back({Weight::kWarning, "trigger_unanswered", "",
-                       "trigger: no frame answers a pulse, the last one began " +
-                           std::to_string(event.span.count() / 1000) +
-                           " us after the nearest: pairs are formed without: do the cameras follow the trigger, and "
+                       "trigger: no frame answers a pulse, the last one began " + off_text(event.span) +
+                           ": pairs are formed without: do the cameras follow the trigger, and "
                            "are trigger.delay_us and trigger.edge theirs?"});
       break;
     case Change::kAnswers:
       notes.push_back({Weight::kNotice, "trigger_answered", "", "trigger: frames answer its pulses again"});
+      break;
+    case Change::kAstray: notes.push_back(astray_note(event.side, event.span, event.frames, event.unanswered)); break;
+    case Change::kFollows:
+      notes.push_back({Weight::kNotice, "camera_follows", name_of(event.side),
+                       std::string(name_of(event.side)) + " camera: its frames answer pulses again"});
       break;
     case Change::kMatched:
       notes.push_back({Weight::kNotice, "cameras_fit", "", "cameras: left and right pictures fit again"});
@@ -785,6 +869,8 @@ SourceFigures StereoCameras::figures() const noexcept {
                       .missed = each.missed.get(),
                       .doubled = each.doubled.get(),
                       .stray = each.stray.get(),
+                      .astray = each.astray.load(std::memory_order_relaxed),
+                      .strayings = each.strayings.get(),
                       .back_off_ms = each.back_off_ms.get()};
   }
   out.paired = pairing_[0].get();

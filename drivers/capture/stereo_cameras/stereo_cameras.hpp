@@ -15,6 +15,7 @@
 #include "drivers/capture/live_source.hpp"
 #include "drivers/capture/stereo_cameras/phase.hpp"
 #include "drivers/capture/stereo_cameras/rate_steering.hpp"
+#include "drivers/trigger/answer_watch.hpp"
 #include "drivers/trigger/pairer.hpp"
 #include "drivers/trigger/pulse_matcher.hpp"
 #include "drivers/trigger/trigger.hpp"
@@ -39,13 +40,18 @@ namespace stereotrack::capture {
 ///   service thread once no slot names its buffers; tend() destroys it, opens another, with back-off, and hands that
 ///   one over. The daemon goes on meanwhile, whatever is gone;
 /// * silence counts from the first frame that came from any camera on. Where frames come `triggered`, both silent is no
-///   fault of theirs: it is told, and they are kept;
+///   fault of theirs: it is told, and they are kept; one is at fault that is asked, by pulses or the other one's
+///   frames, for half of `timeout` without a pause of all of it;
 /// * both deliver and no two fit for `timeout`: likewise mono, until two fit. Late right frames make it more patient;
 /// * with a trigger::Trigger, frames are counted against its pulses, and the number of a frame's pulse is what two must
 ///   have in common: a missed or doubled exposure breaks no pair. Frames that no pulse asked for are given back. While
 ///   no pulse is told and frames come, they pair without;
 /// * no frame answers a pulse for `timeout`: the cameras do not follow the trigger, or with another delay. Frames pair
-///   without pulses, until kConvincing in a row answer one;
+///   without pulses, until AnswerWatch::kConvincing in a row of a camera answer one;
+/// * one camera answers and the other does not, or with under two thirds of its frames (trigger::AnswerWatch: its wire
+///   is off, it runs free): as if it were lost, but it is kept. It is named; without the right one left pictures go on
+///   in mono, without the left one no pair comes; its frames are given back, whatever they would fit, until it is
+///   believed again;
 /// * a left frame, whose time is its pair's, bears one after its arrival: told once a camera; no result leaves on time;
 /// * a camera that comes back and delivers another size or format is refused;
 /// * two that nobody triggers and that are to `steer`: tend() holds the right one's rate to the left one's
@@ -58,7 +64,6 @@ class StereoCameras final : public LiveSource {
  public:
   static constexpr std::size_t kMostBuffers = 64;             ///< of one camera
   static constexpr std::chrono::milliseconds kStartUp{2000};  ///< over `timeout`, for a camera's first frame
-  static constexpr int kConvincing = 8;                       ///< answers in a row for which pulses are believed again
   static constexpr int kLeastTimeoutPeriods = 4;              ///< a shorter `timeout` is held to so many
 
   /// Opens the camera of that side; called by the constructor, then by tend(). Throws std::runtime_error, one line.
@@ -109,12 +114,16 @@ class StereoCameras final : public LiveSource {
     kNoPulses,
     kPulses,
     kNoAnswers,
-    kAnswers
+    kAnswers,
+    kAstray,
+    kFollows
   };
   struct Event {
     Change change{};
     Side side{};
     std::chrono::nanoseconds span{0};
+    std::uint32_t frames = 0;      ///< kAstray, the two
+    std::uint32_t unanswered = 0;  ///< of these
   };
   struct Distance {
     CaptureTime time{};
@@ -133,7 +142,10 @@ class StereoCameras final : public LiveSource {
     MonotonicTime joined{};
     std::optional<MonotonicTime> heard;  ///< when its last good frame came
     CaptureTime last{};                  ///< of it
-    Camera::Counters before;             ///< of cameras that were
+    MonotonicTime asked{};               ///< since when frames were asked of it without a pause
+    MonotonicTime last_asked{};
+    Camera::Counters before;     ///< of cameras that were
+    trigger::AnswerWatch watch;  ///< with a trigger
     std::array<SensorSettings, kMostBuffers> settings{};
 
     // ---- Handed over. Release where it is put, acquire where it is taken: the camera, and the four below
@@ -144,6 +156,7 @@ class StereoCameras final : public LiveSource {
 
     // ---- Capture thread writes, any reads
     std::atomic<bool> silent{false};
+    std::atomic<bool> astray{false};
     Counter frames;
     Counter damaged;
     Counter lost;
@@ -152,6 +165,7 @@ class StereoCameras final : public LiveSource {
     Counter missed;
     Counter doubled;
     Counter stray;
+    Counter strayings;
 
     // ---- Service thread
     Camera* serves = nullptr;  ///< for its service part alone: `camera`, `incoming` or `retired`; null: there is none
@@ -186,16 +200,23 @@ class StereoCameras final : public LiveSource {
   void settle(PairOutlet& outlet, const trigger::Pairer::Outcome& outcome) noexcept;
   void put(PairOutlet& outlet, const trigger::Settled& settled, bool both) noexcept;
   void look_for_silence(PairOutlet& outlet, MonotonicTime now) noexcept;
+  void ask(Side side, MonotonicTime at) noexcept;
   void take_pulses(PairOutlet& outlet) noexcept;
   void look_for_pulses(PairOutlet& outlet, MonotonicTime now) noexcept;
   void look_for_answers(PairOutlet& outlet) noexcept;
   [[nodiscard]] bool answers(PairOutlet& outlet, Side side, CaptureTime mid_exposure, const SensorFrame& frame,
                              std::uint64_t& sequence) noexcept;
   void trust_pulses(PairOutlet& outlet, bool trust) noexcept;
+  void call_astray(Side side) noexcept;
+  void believe(PairOutlet& outlet, Side side) noexcept;
+  [[nodiscard]] MonotonicTime last_answer() const noexcept;
   [[nodiscard]] bool both_count() const noexcept;
   void look_for_fits(MonotonicTime now) noexcept;
   [[nodiscard]] bool is_out(Side side) const noexcept;
-  [[nodiscard]] bool goes_alone() const noexcept { return is_out(Side::kRight) || unmatched_; }
+  [[nodiscard]] bool is_astray(Side side) const noexcept;
+  [[nodiscard]] bool goes_alone() const noexcept {
+    return is_out(Side::kRight) || is_astray(Side::kRight) || unmatched_;
+  }
   void tell(Change change, Side side, std::chrono::nanoseconds span = {}) noexcept;
   void count() noexcept;
 
@@ -217,12 +238,9 @@ class StereoCameras final : public LiveSource {
   // Capture thread's.
   std::optional<trigger::Pairer> pairer_;
   std::unique_ptr<trigger::Trigger> trigger_;
-  std::optional<trigger::PulseMatcher> matcher_;  ///< with a trigger
-  MonotonicTime last_pulse_{};                    ///< when one was told
-  bool pulses_trusted_ = false;                   ///< frames are numbered by them
-  MonotonicTime last_answer_{};                   ///< when a frame answered one, or they began to be trusted
-  int answers_in_row_ = 0;
-  std::chrono::nanoseconds off_{0};                  ///< of the last frame that answered none
+  std::optional<trigger::PulseMatcher> matcher_;     ///< with a trigger
+  MonotonicTime last_pulse_{};                       ///< when one was told
+  bool pulses_trusted_ = false;                      ///< frames are numbered by them
   std::array<Named, FramePool::kMaxSlots> named_{};  ///< by slot
   std::optional<MonotonicTime> armed_;               ///< when the first frame of all came
   MonotonicTime last_pair_{};

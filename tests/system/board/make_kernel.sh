@@ -59,6 +59,7 @@ cp "$work/$source"/kernel/irq/irq_sim.c "$work/$source"/drivers/gpio/{gpio-sim.c
   "$work"/tree/usr/src/v4l2loopback-*/*.[ch] "$here/modules/Kbuild" "$work/modules/"
 cp -r "$work/$source/drivers/media/test-drivers/vimc" "$work/modules/vimc"
 cp "$here/modules/Kbuild.vimc" "$work/modules/vimc/Makefile"
+cp "$here/modules/vimc-exposure.h" "$work/modules/vimc/"
 python3 "$here/modules/adapt.py" "$work/modules"
 headers=$work/tree/usr/src/linux-headers-$release
 sed -i "s|/usr/src/|$work/tree/usr/src/|" "$headers/Makefile"

@@ -252,6 +252,81 @@ TEST(CamerasDaemon, ItsOwnPulsesAskForFramesAndAMissedExposureIsTold) {
   }
 }
 
+TEST(CamerasDaemon, ACameraWhoseTriggerWireIsOffIsAnAlarmWithItsName) {
+  CameraScene scene(kSceneFormats[0], kPeriod);
+  auto train = train_on("daemon-trigger-wire");
+  auto source = scene.open_triggered(20, train->trigger());
+  LiveRig rig(std::move(source), kLatency, {}, {}, {}, std::move(train));
+  // A pulse that is late on a busy machine raises the trigger's own alarm, too.
+  const std::uint32_t left_astray = telemetry::kHealthLeftAstray;
+  const std::uint32_t right_astray = telemetry::kHealthRightAstray;
+  const std::uint32_t all = left_astray | right_astray;
+  int stage = 0;
+  std::size_t mark = 0;
+  std::string astray_metrics;
+  run(rig, [&] {
+    const std::vector<Pair>& pairs = rig.ear.pairs();
+    if (pairs.empty() || rig.ear.statuses().empty()) return false;
+    const std::uint32_t health_told = rig.ear.statuses().back().health;
+    const bool is_stereo = !has(pairs.back(), telemetry::kMono) && pairs.back().header.ordinal != 0;
+    switch (stage) {
+      case 0:
+        if (pairs.size() < 50 || !is_stereo) break;
+        EXPECT_EQ(health_told & all, 0U);
+        scene.unwire(Side::kRight, true);
+        ++stage;
+        break;
+      case 1:
+        if ((health_told & all) != right_astray || !has(pairs.back(), telemetry::kMono)) break;
+        if ((pairs.back().live->health & all) != right_astray) break;  // it leaves with the pairs, too
+        EXPECT_NE(health_told & telemetry::kHealthTriggerFailed, 0U);
+        astray_metrics = metrics_text(*rig.daemon, 3);
+        scene.unwire(Side::kRight, false);
+        ++stage;
+        break;
+      case 2:
+        if ((health_told & all) != 0 || !is_stereo) break;
+        scene.unwire(Side::kLeft, true);
+        ++stage;
+        break;
+      case 3:
+        if ((health_told & all) != left_astray || (health_told & telemetry::kHealthNoPairs) == 0) break;
+        mark = pairs.size();
+        scene.unwire(Side::kLeft, false);
+        ++stage;
+        break;
+      default: return (health_told & all) == 0 && pairs.size() > mark + 20 && is_stereo;
+    }
+    return false;
+  });
+  scene.stop();
+  EXPECT_EQ(stage, 4);
+  for (const char* camera : {"right", "left"}) {
+    for (const char* cause : {"camera_astray", "camera_follows"}) {
+      EXPECT_EQ(std::count_if(rig.notes.begin(), rig.notes.end(),
+                              [&](const capture::SourceNote& note) {
+                                return note.camera == std::string(camera) && note.cause == std::string(cause);
+                              }),
+                1)
+          << camera << ' ' << cause;
+    }
+  }
+  EXPECT_FALSE(said(rig, "cameras_do_not_fit", ""));
+  for (const char* line :
+       {"stereotrack_camera_astray{camera=\"right\"} 1\n", "stereotrack_camera_astray{camera=\"left\"} 0\n",
+        "stereotrack_camera_strayings_total{camera=\"right\"} 1\n", "stereotrack_trigger_unanswered 0\n"}) {
+    EXPECT_NE(astray_metrics.find(line), std::string::npos) << line;
+  }
+  for (const Pair& pair : rig.ear.pairs()) {
+    if (pair.live && pair.live->pair_skew) {
+      EXPECT_EQ(*pair.live->pair_skew, microseconds(0));  // a wrong pair is half a period apart
+    }
+  }
+  if (allocations_are_counted()) {
+    EXPECT_EQ(rig.daemon->vitals().allocations(), 0U);
+  }
+}
+
 TEST(CamerasDaemon, InAFaultItsPulsesStopAtOnce) {
   CameraScene scene(kSceneFormats[0], kPeriod);
   auto train = train_on("daemon-trigger-fault");

@@ -48,6 +48,18 @@ TEST(PulseMatcher, AMissedExposureIsFoundWithTheNextFrameOfItsSide) {
   EXPECT_EQ(matcher.counters(Side::kLeft).missed, 0U);
 }
 
+TEST(PulseMatcher, AStrayIsBetweenPulsesOrOfATimeWhosePulsesAreForgotten) {
+  PulseMatcher matcher = make();
+  EXPECT_FALSE(matcher.frame(Side::kLeft, at(1)).between);
+  for (std::uint64_t n = 1; n <= 20; ++n) matcher.pulse(n, at(n));
+  EXPECT_TRUE(matcher.frame(Side::kLeft, at(10) + kDelay + milliseconds(8)).between);
+  EXPECT_TRUE(matcher.frame(Side::kLeft, at(20) + kDelay + milliseconds(8)).between);
+  EXPECT_TRUE(matcher.frame(Side::kLeft, at(20) + kDelay + kPeriod).between);
+  EXPECT_FALSE(matcher.frame(Side::kLeft, at(20) + kDelay + kPeriod + microseconds(1)).between);
+  EXPECT_FALSE(matcher.frame(Side::kLeft, at(3)).between);  // 1 to 4 are forgotten
+  EXPECT_EQ(matcher.counters(Side::kLeft).stray, 6U);
+}
+
 TEST(PulseMatcher, ASideThatAnswersNoMoreIsFoundTwoPulsesLater) {
   PulseMatcher matcher = make();
   for (std::uint64_t n = 1; n <= 5; ++n) {

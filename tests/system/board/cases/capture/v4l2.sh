@@ -7,5 +7,5 @@ source /payload/.board/tap.sh
 # Debian 13's v4l2loopback promises the monotonic clock.
 without=
 if [[ $(uname -r) != 6.1.* ]]; then without=Frames.OfADriverThatPromisesNoClockAreStampedAsTheyAreTaken; fi
-gtest v4l2_board_test "--gtest_filter=-$without"
+gtest v4l2_board_test "--gtest_filter=-Controls.*:$without"
 finish
