@@ -20,17 +20,18 @@ block() {
     { inside = 0 }
     /^## / { in_section = $0 == title }' "$page"
 }
-# CODES ANSWER COMMAND: it ends with one of these codes; to what it asks it is told ANSWER.
+# CODES ANSWERS COMMAND: it ends with one of these codes; what it asks is answered in this order, the last one for ever.
 ends_with() {
   local code
   # What follows for ever is left after some seconds of the board's.
-  timeout 100 bash -c "$3" < <(yes "$2") >/run/said.txt 2>&1
+  # shellcheck disable=SC2086  # several words
+  timeout 100 bash -c "$3" < <(printf '%s\n' $2 && yes "${2##* }" 2>/dev/null) >/run/said.txt 2>&1
   code=$?
   tail -n 40 /run/said.txt
   echo "code $code"
   [[ $code =~ ^($1)$ ]]
 }
-# SECTION NUMBER ANSWER: a fact of each line.
+# SECTION NUMBER ANSWERS: a fact of each line.
 follow() {
   local command codes count=0
   while IFS= read -r command <&4; do
@@ -93,7 +94,7 @@ mv stereotrack_"$old"_arm64.deb stereotrack_OLD_arm64.deb
 fact "there is a newer package" make_version "$old+1"
 process=$(property MainPID)
 cp $configuration /run/mine.toml
-# dpkg's question: keep what is installed.
+# dpkg's question, whether to take the package's configuration.
 follow "Update, and back" 1 n
 fact "it is the newer one" version_is "$old+1"
 fact "which runs" eventually over "$paired" 5
@@ -101,7 +102,8 @@ fact "as another process" test "$(property MainPID)" != "$process"
 fact "the configuration is mine" cmp $configuration /run/mine.toml
 fact "the new one's lies beside it" grep -q 'another default' $configuration.dpkg-dist
 process=$(property MainPID)
-follow "Update, and back" 2 y
+# apt's, whether to go back; and dpkg's.
+follow "Update, and back" 2 "y n"
 fact "it is the old one" version_is "$old"
 fact "which runs, too" eventually over "$paired" 5
 fact "as another process again" test "$(property MainPID)" != "$process"
