@@ -55,11 +55,11 @@ class Histogram {
   }
   /// Values under 16 have a bucket each; others are told by their first five binary digits.
   [[nodiscard]] static constexpr std::size_t bucket_of(std::uint64_t value) noexcept {
-    if (value < kSubs) return value;
+    if (value < kSubs) return static_cast<std::size_t>(value);
     const auto digits = static_cast<unsigned>(std::bit_width(value));
     if (digits > kLargestBits) return kBuckets - 1;
     const unsigned shift = digits - kSubBits - 1;
-    return shift * kSubs + (value >> shift);
+    return static_cast<std::size_t>(shift * kSubs + (value >> shift));
   }
   /// The largest value of a bucket.
   [[nodiscard]] static constexpr std::uint64_t end_of(std::size_t bucket) noexcept {

@@ -37,6 +37,11 @@ std::uint32_t narrow(std::uint64_t count) noexcept {
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(count, std::numeric_limits<std::uint32_t>::max()));
 }
 
+/// Where the notice of a pair is kept: they are as many as slots may be in flight.
+std::size_t place_of(std::uint64_t ordinal) noexcept {
+  return static_cast<std::size_t>(ordinal % OutputSchedule::kMaxInFlight);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Publisher>> Publisher::create(const Config& config, std::unique_ptr<Plan> plan,
@@ -107,7 +112,7 @@ void Publisher::take_news() noexcept {
   while (notices_.pop(notice)) {
     // Read after it came: a pair that was put in a moment ago must not look as if it were to come.
     schedule_.notice(notice.ordinal, notice.capture_time, runtime::monotonic_now());
-    noticed_[notice.ordinal % noticed_.size()] = notice;
+    noticed_[place_of(notice.ordinal)] = notice;
     judge_exposure(notice);
   }
   if (const Outcome* outcome = mailbox_.take()) {
@@ -132,7 +137,7 @@ void Publisher::judge_exposure(const capture::PairNotice& notice) noexcept {
 /// Null: no pair, or one from long ago.
 const capture::PairNotice* Publisher::notice_of(const Output& output) const noexcept {
   if (output.ordinal == 0) return nullptr;
-  const std::optional<capture::PairNotice>& notice = noticed_[output.ordinal % noticed_.size()];
+  const std::optional<capture::PairNotice>& notice = noticed_[place_of(output.ordinal)];
   return notice && notice->ordinal == output.ordinal ? &*notice : nullptr;
 }
 

@@ -106,5 +106,35 @@ class Pages(unittest.TestCase):
                 value = value[key]
 
 
+class Board(unittest.TestCase):
+    """docs/BOARD.md, which tests/system/board/cases/rig/manual.sh follows on the board."""
+    PAGE = (PROJECT / "docs/BOARD.md").read_text()
+    CASE = (PROJECT / "tests/system/board/cases/rig/manual.sh").read_text()
+    SECTIONS = {title: body for title, body in re.findall(r"^## (.*)\n((?:(?!## ).*\n)*)", PAGE, re.M)}
+
+    @staticmethod
+    def blocks(body):
+        """Runs of indented lines."""
+        return re.findall(r"(?m)(?:^    .*\n)+", body)
+
+    def test_each_block_is_run_there_or_said_to_need_the_hardware(self):
+        said = re.search(r"(\"[^.]*) \*\*need the hardware\*\*", self.PAGE)[1]
+        self.assertGreater(len(self.SECTIONS), 4)
+        for title, body in self.SECTIONS.items():
+            run_there = set(re.findall(rf'(?:follow|block) "?{re.escape(title)}"? (\d+)', self.CASE))
+            there = {str(number) for number in range(1, len(self.blocks(body)) + 1)}
+            with self.subTest(section=title):
+                self.assertEqual(run_there, set() if f'"{title}"' in said else there)
+
+    def test_its_configuration_lacks_nothing_but_the_cameras(self):
+        configuration = next(block for block in self.blocks(self.SECTIONS["Install"]) if "[source]" in block)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder, "rig.toml")
+            for key, code in (("exposure_us", 1), ("exposure_uss", 2)):
+                path.write_text(re.sub("(?m)^    ", "", configuration).replace("exposure_us", key))
+                done = run(["stereotrackd", "--config", str(path), "--check-config"])
+                self.assertEqual(done.returncode, code, done.stderr)
+
+
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])

@@ -2,7 +2,8 @@
 """Whole runs give the same bytes on another CPU as on this machine: tracks.csv, telemetry.bin, and of summary.json all but
 times and memory.
 
-    same_bytes.py --native STEREOTRACK --other STEREOTRACK [--only NAME] scenes|recordings EMULATOR [ARGUMENT...]
+    same_bytes.py --native STEREOTRACK --other STEREOTRACK NAME EMULATOR [ARGUMENT...]
+    same_bytes.py names                                                                    which NAMEs there are
 
 An emulator draws a scene for long: it draws a few small pairs itself; of the rest this machine draws the pictures.
 Recordings are those of ../shared/data that are pictures; without them exit 77. A video is not compared: FFmpeg's decoder gives
@@ -91,24 +92,26 @@ def compare(name, native, other, case, scene):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["scenes", "recordings"])
-    parser.add_argument("--native", required=True)
-    parser.add_argument("--other", required=True)
-    parser.add_argument("--only", metavar="NAME")
+    parser.add_argument("name", choices=["names", *SCENES, *RECORDINGS])
+    parser.add_argument("--native")
+    parser.add_argument("--other")
     parser.add_argument("emulator", nargs=argparse.REMAINDER)
     args = parser.parse_args()
-    if args.what == "recordings" and not DATA.is_dir():
+    if args.name == "names":
+        print(*SCENES, *RECORDINGS)
+        return 0
+    if not args.native or not args.other:
+        parser.error("want --native and --other")
+    if args.name in RECORDINGS and not DATA.is_dir():
         print(f"skipped: the recordings of ../shared/data are not there: {DATA}")
         return SKIPPED
-    cases = SCENES if args.what == "scenes" else RECORDINGS
     with tempfile.TemporaryDirectory() as temporary:
         scene = pathlib.Path(temporary) / "eleven"
-        if args.what == "scenes":
+        case = {**SCENES, **RECORDINGS}[args.name]
+        if case[0] == "SCENE":
             subprocess.run([args.native, "synth", "eleven", "--out", scene, "--frames", "90", "--size", "320x240"],
                            check=True, stdout=subprocess.DEVNULL)
-        for name, case in cases.items():
-            if args.only in (None, name):
-                compare(name, args.native, [*args.emulator, args.other], case, scene)
+        compare(args.name, args.native, [*args.emulator, args.other], case, scene)
     return 0
 
 

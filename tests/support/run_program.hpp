@@ -28,7 +28,7 @@ inline std::string read_text(const std::filesystem::path& path) {
 }
 
 struct ProgramOptions {
-  std::chrono::milliseconds limit{120'000};  ///< then it is killed
+  std::chrono::milliseconds limit{120'000};  ///< then it is killed; in an emulator after five times as long
   /// Largest file it may write [bytes], 0 = any. SIGXFSZ is ignored, so that writing fails as on a full disk.
   /// Its stdout and stderr are files too: leave room for the lines expected.
   rlim_t most_file_bytes = 0;
@@ -61,6 +61,7 @@ class Program {
   explicit Program(std::vector<std::string> command, ProgramOptions options = {})
       : options_(std::move(options)), start_(Clock::now()) {
     const std::vector<std::string> before = emulator();
+    if (!before.empty()) options_.limit *= 5;
     command.insert(command.begin(), before.begin(), before.end());
     std::vector<char*> arguments;
     arguments.reserve(command.size() + 1);

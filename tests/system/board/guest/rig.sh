@@ -25,7 +25,9 @@ configure() {
   } >"$configuration"
 }
 # PAIRS_A_SECOND WIDTHxHEIGHT LATENCY_MS [SOURCE], standard input: more. Thirty pairs of a scene, back and forth, without
-# cameras. What leaves within 20 ms of its moment is on time: the emulated processors are few and slow.
+# cameras. What leaves within 50 ms of its moment is on time. The emulator's two processors take turns of a tick, 4 ms each
+# while the other one is busy, so that an interrupt waits for its turn, who it wakes for the next one, and who sleeps once
+# more, as the publisher does, for two more: sched_switch and hrtimer_expire_entry show five turns in a row.
 configure_scene() {
   {
     cat <<END
@@ -38,8 +40,8 @@ width = ${2%x*}
 height = ${2#*x}
 [latency]
 output_ms = $3
-late_ms = 20.0
-grace_ms = 20.0
+late_ms = 50.0
+grace_ms = 50.0
 END
     cat
   } | configure
@@ -56,14 +58,17 @@ runs() { eventually over stereotrack_frames_total "${1:-5}"; }
 ready_after_us() { echo $(($(property ActiveEnterTimestampMonotonic) - $(property InactiveExitTimestampMonotonic))); }
 # CLOCK_MONOTONIC [us].
 now_us() { awk '{ printf "%d", $1 * 1000000 }' /proc/uptime; }
-# Each output left with its own result. Who is asked for figures keeps a processor of the emulator busy, and the publisher
+# Each pair left, but for those on their way, and with its own result. Who is asked for figures keeps a processor of the emulator busy, and the publisher
 # from waking at once, now and then: after_due is no part of this.
 all_left() {
   local cause
   for cause in predicted_late predicted_superseded missing overslept_pairs overslept_missing without_state outages; do
     is "stereotrack_outputs_total{cause=\"$cause\"}" 0 || return
   done
-  none stereotrack_sent_late_total
+  none stereotrack_sent_late_total && awk '
+    $1 == "stereotrack_frames_total" { pairs = $2 }
+    $1 == "stereotrack_outputs_total{cause=\"on_time\"}" { left = $2 }
+    END { print pairs " pairs, " left " left"; exit !(left > 0 && pairs - left <= 2 && left - pairs <= 1) }' "$figures"
 }
 ask_for_a_recording() { systemctl kill --signal=USR1 stereotrackd; }
 restarted() { [[ $(property NRestarts) == "$1" ]]; }

@@ -119,6 +119,9 @@ fact "into its state directory" eventually recorded /var/lib/stereotrack
 fact "a disk is none of its devices" is_forbidden /dev/vda
 fact "the kernel's log neither" is_forbidden /dev/kmsg
 fact "the board finds it no more exposed than was promised" exposed_at_most stereotrackd.service 1.5
+for one in stereotrackd.service stereotrackd@two.service; do
+  systemd-analyze security --no-pager "$one" | tail -n 1 | tell
+done
 
 sed -i 's|127.0.0.1:47800|127.0.0.1:47801|' $configuration
 fact "it reads its configuration again" systemctl reload stereotrackd
