@@ -94,8 +94,15 @@ void write_table(const Scores& s, std::ostream& out) {
                {"median/z", known(p.relative_pairs, percent(p.relative_median))},
                {"95 %/z", known(p.relative_pairs, percent(p.relative_p95))},
                {"pairs", count(p.pairs)},
-               {"no x y z", count(p.missing)}},
+               {"no x y z", count(p.missing)},
+               {"/(1/4 px)", known(p.geometry_pairs, fixed(p.geometry_median, 2))}},
               out);
+  write_group("velocity",
+              {{"median", known(s.velocity.pairs, percent(s.velocity.median))},
+               {"95 %", known(s.velocity.pairs, percent(s.velocity.p95))},
+               {"pairs", count(s.velocity.pairs)}},
+              out);
+  write_group("false", {{"tracks", count(s.false_tracks)}, {"a minute", fixed(s.false_tracks_a_minute, 2)}}, out);
 }
 
 void write_json(const Scores& s, std::ostream& out) {
@@ -151,6 +158,12 @@ void write_json(const Scores& s, std::ostream& out) {
   count("position_relative_pairs", p.relative_pairs);
   real_if(p.relative_pairs, "position_relative_median", p.relative_median);
   real_if(p.relative_pairs, "position_relative_p95", p.relative_p95);
+  real_if(p.geometry_pairs, "position_geometry_median", p.geometry_median);
+  count("velocity_pairs", s.velocity.pairs);
+  real_if(s.velocity.pairs, "velocity_median", s.velocity.median);
+  real_if(s.velocity.pairs, "velocity_p95", s.velocity.p95);
+  count("false_tracks", s.false_tracks);
+  real("false_tracks_a_minute", s.false_tracks_a_minute);
   out << text << "\n}\n";
 }
 

@@ -6,7 +6,8 @@
 
 namespace stereotrack::evaluation {
 
-/// Aligned columns for people: rates in percent, 3-D errors in the files' unit and in percent of z,
+/// Aligned columns for people: rates in percent, 3-D errors in the files' unit, in percent of z and
+/// as a multiple of what a quarter of a pixel of disparity is worth, velocities in percent of the true speed,
 /// "-" where there was nothing to measure.
 void write_table(const Scores& scores, std::ostream& out);
 

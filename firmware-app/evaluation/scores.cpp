@@ -209,14 +209,21 @@ double percentile(const std::vector<double>& sorted, double fraction) {
 
 class PositionErrors {
  public:
+  explicit PositionErrors(double focal_baseline) : focal_baseline_(focal_baseline) {}
+
   void add(const MotRow& truth, const MotRow& track) {
     if (!truth.has_position) return;
     if (!track.has_position) {
       ++missing_;
       return;
     }
+    constexpr double kQuarterPixel = 0.25;
+    const double z = truth.position.z();
     absolute_.push_back((track.position - truth.position).norm());
-    if (truth.position.z() > 0) relative_.push_back(absolute_.back() / truth.position.z());
+    if (z > 0) relative_.push_back(absolute_.back() / z);
+    if (z > 0 && focal_baseline_ > 0) {
+      geometry_.push_back(absolute_.back() / (z * z / focal_baseline_ * kQuarterPixel));
+    }
   }
 
   [[nodiscard]] PositionError summary() {
@@ -224,8 +231,10 @@ class PositionErrors {
     error.pairs = absolute_.size();
     error.missing = missing_;
     error.relative_pairs = relative_.size();
+    error.geometry_pairs = geometry_.size();
     std::sort(absolute_.begin(), absolute_.end());
     std::sort(relative_.begin(), relative_.end());
+    std::sort(geometry_.begin(), geometry_.end());
     if (!absolute_.empty()) {
       error.median = percentile(absolute_, 0.5);
       error.p95 = percentile(absolute_, 0.95);
@@ -234,13 +243,50 @@ class PositionErrors {
       error.relative_median = percentile(relative_, 0.5);
       error.relative_p95 = percentile(relative_, 0.95);
     }
+    if (!geometry_.empty()) error.geometry_median = percentile(geometry_, 0.5);
     return error;
   }
 
  private:
+  double focal_baseline_;
   std::vector<double> absolute_;
   std::vector<double> relative_;
+  std::vector<double> geometry_;
   std::size_t missing_ = 0;
+};
+
+class VelocityErrors {
+ public:
+  explicit VelocityErrors(const Options& options) : options_(options) {}
+
+  void add(const MotRow& truth, const MotRow& track) {
+    if (!truth.has_position || !track.has_position) return;
+    constexpr std::int64_t kFrames = 10;
+    auto& places = places_[{truth.id, track.id}];
+    places[truth.frame] = {truth.position, track.position};
+    const auto before = places.find(truth.frame - kFrames);
+    if (before == places.end()) return;
+    const double passed_s = kFrames / options_.fps;
+    const Eigen::Vector3d true_way = truth.position - before->second.truth;
+    if (true_way.norm() < options_.min_speed * passed_s) return;
+    const Eigen::Vector3d way = track.position - before->second.track;
+    errors_.push_back((way - true_way).norm() / true_way.norm());
+  }
+
+  [[nodiscard]] VelocityError summary() {
+    if (errors_.empty()) return {};
+    std::sort(errors_.begin(), errors_.end());
+    return {errors_.size(), percentile(errors_, 0.5), percentile(errors_, 0.95)};
+  }
+
+ private:
+  struct Places {
+    Eigen::Vector3d truth;
+    Eigen::Vector3d track;
+  };
+  Options options_;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::map<std::int64_t, Places>> places_;
+  std::vector<double> errors_;
 };
 
 /// What CLEAR remembers of one object.
@@ -255,7 +301,8 @@ void score_clear(const Sequence& sequence, const Options& options, Scores& score
   // Any IoU is at most 1, so one kept pair outweighs every other wish as long as a frame has fewer boxes.
   constexpr double kKeepPair = 1000;
   std::vector<ObjectHistory> objects(scores.truth_ids);
-  PositionErrors errors;
+  PositionErrors errors(options.focal_baseline);
+  VelocityErrors velocities(options);
   double similarity_sum = 0;
   for (const Frame& frame : sequence.frames) {
     // As TrackEval: a frame without truth or without tracks leaves the memory of the previous one as it is.
@@ -283,6 +330,7 @@ void score_clear(const Sequence& sequence, const Options& options, Scores& score
       ++object.matched;
       similarity_sum += frame.similarity(pair.truth, pair.track);
       errors.add(*frame.truth[pair.truth], *frame.tracks[pair.track]);
+      velocities.add(*frame.truth[pair.truth], *frame.tracks[pair.track]);
     }
     for (std::size_t i = 0; i < objects.size(); ++i) objects[i].previous_track = tracked_by[i];
     scores.true_positives += pairs.size();
@@ -303,6 +351,7 @@ void score_clear(const Sequence& sequence, const Options& options, Scores& score
   scores.recall = ratio(scores.true_positives, scores.truth_boxes);
   scores.precision = ratio(scores.true_positives, scores.track_boxes);
   scores.position = errors.summary();
+  scores.velocity = velocities.summary();
 }
 
 void score_identity(const Sequence& sequence, const Options& options, Scores& scores) {
@@ -325,6 +374,42 @@ void score_identity(const Sequence& sequence, const Options& options, Scores& sc
   scores.idf1 = ratio(2 * scores.id_true_positives, scores.truth_boxes + scores.track_boxes);
 }
 
+/// The part of a box that lies within another one.
+double covered(const Box& box, const Box& by) {
+  const double width = std::min(box.left + box.width, by.left + by.width) - std::max(box.left, by.left);
+  const double height = std::min(box.top + box.height, by.top + by.height) - std::max(box.top, by.top);
+  if (width <= 0 || height <= 0) return 0.0;
+  return width * height / (box.width * box.height);
+}
+
+void count_false_tracks(const Truth& truth, const Tracks& tracks, const Options& options, Scores& scores) {
+  std::map<std::int64_t, std::vector<const MotRow*>> objects;
+  std::int64_t last = options.frames;
+  for (const MotRow& row : truth.rows) {
+    objects[row.frame].push_back(&row);
+    if (options.frames == 0) last = std::max(last, row.frame);
+  }
+  struct Rows {
+    std::size_t all = 0;
+    std::size_t on_object = 0;
+  };
+  std::map<std::int64_t, Rows> ids;
+  for (const MotRow& row : tracks.rows) {
+    if (options.frames == 0) last = std::max(last, row.frame);
+    Rows& rows = ids[row.id];
+    ++rows.all;
+    const auto there = objects.find(row.frame);
+    if (there == objects.end()) continue;
+    rows.on_object += std::any_of(there->second.begin(), there->second.end(),
+                                  [&](const MotRow* object) { return covered(row.box, object->box) >= 0.5; })
+                          ? 1U
+                          : 0U;
+  }
+  for (const auto& [id, rows] : ids) scores.false_tracks += 2 * rows.on_object < rows.all ? 1U : 0U;
+  scores.false_tracks_a_minute =
+      ratio(static_cast<double>(scores.false_tracks), static_cast<double>(last) / options.fps / 60);
+}
+
 }  // namespace
 
 Scores evaluate(const Truth& truth, const Tracks& tracks, const Options& options) {
@@ -333,6 +418,7 @@ Scores evaluate(const Truth& truth, const Tracks& tracks, const Options& options
   score_hota(sequence, scores);
   score_clear(sequence, options, scores);
   score_identity(sequence, options, scores);
+  count_false_tracks(truth, tracks, options, scores);
   return scores;
 }
 

@@ -16,6 +16,18 @@ struct PositionError {
   std::size_t relative_pairs = 0;  ///< of those, pairs whose true z is over 0
   double relative_median = 0;      ///< the distance as a fraction of the true z
   double relative_p95 = 0;
+  std::size_t geometry_pairs = 0;  ///< pairs with a true z over 0, where Options::focal_baseline is known
+  /// Of the distance over what a quarter of a pixel of disparity is worth there, z^2 / (f b) 0.25.
+  double geometry_median = 0;
+};
+
+/// How far a track's velocity lies from the truth's, as a fraction of the true speed. Velocities are those of the
+/// written places: from ten frames before to now, over the time between. Over pairs of CLEAR that were the same pair
+/// ten frames before, whose places are known in both, and whose true speed is at least Options::min_speed.
+struct VelocityError {
+  std::size_t pairs = 0;  ///< 0: the values below are 0 and mean nothing
+  double median = 0;
+  double p95 = 0;
 };
 
 /// What a tracker got right. Rates are 0..1 (MOTA may be negative). Definitions are those of TrackEval
@@ -64,10 +76,20 @@ struct Scores {
   std::size_t id_false_negatives = 0;
 
   PositionError position;
+  VelocityError velocity;
+
+  /// Tracks of which less than half of the boxes lie on an object: half of the box's area or more within one box of the
+  /// truth, scored or not. A part of an object is no false track, a ghost or a shadow is one.
+  std::size_t false_tracks = 0;
+  double false_tracks_a_minute = 0;
 };
 
 struct Options {
-  double min_overlap = 0.5;  ///< IoU from which two boxes may be the same (CLEAR, identity, ignored truth)
+  double min_overlap = 0.5;   ///< IoU from which two boxes may be the same (CLEAR, identity, ignored truth)
+  double fps = 30;            ///< frames a second, for what goes by time
+  std::int64_t frames = 0;    ///< how many the sequence has; 0: up to the last that either file names
+  double focal_baseline = 0;  ///< f b of the rectified pair [px times the files' unit]; 0: not known
+  double min_speed = 0.3;     ///< under that a velocity is not compared [the files' unit a second]
 };
 
 /// Scores `tracks` against `truth`. Pure; any thread; neither list needs an order. In short:
@@ -77,6 +99,7 @@ struct Options {
 ///   sequence; a pair counts for every threshold that its IoU reaches.
 /// * CLEAR: pairs of the previous frame stay together while their IoU allows; the rest by largest total IoU.
 ///   A switch is an object whose track differs from its last one, however long ago that was.
+/// * False tracks: see Scores::false_tracks.
 /// * Identity: tracks and objects are assigned once, by the number of frames with IoU >= min_overlap.
 [[nodiscard]] Scores evaluate(const Truth& truth, const Tracks& tracks, const Options& options = {});
 

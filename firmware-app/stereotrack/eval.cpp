@@ -12,7 +12,11 @@ namespace stereotrack {
 int run_eval(const EvalArguments& arguments, std::ostream& out) {
   const evaluation::Truth truth{evaluation::read_mot(arguments.truth)};
   const evaluation::Tracks tracks{evaluation::read_mot(arguments.tracks)};
-  const evaluation::Scores scores = evaluation::evaluate(truth, tracks);
+  evaluation::Options options;
+  options.fps = arguments.fps;
+  options.frames = arguments.frames;
+  options.focal_baseline = arguments.focal_baseline;
+  const evaluation::Scores scores = evaluation::evaluate(truth, tracks, options);
   if (arguments.json) {
     evaluation::write_json(scores, out);
   } else {

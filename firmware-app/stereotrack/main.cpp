@@ -80,10 +80,21 @@ int run(int argc, char** argv) {
   stereotrack::add_options(*synth_command, synth);
 
   stereotrack::EvalArguments eval;
-  CLI::App* eval_command =
-      app.add_subcommand("eval", "scores tracks against ground truth: HOTA, MOTA, IDF1, 3-D error");
+  CLI::App* eval_command = app.add_subcommand(
+      "eval", "scores tracks against ground truth: HOTA, MOTA, IDF1, 3-D error, velocity, false tracks");
   eval_command->add_option("--truth", eval.truth, "ground truth, MOT columns")->required();
   eval_command->add_option("--tracks", eval.tracks, "tracks, MOT columns")->required();
+  eval_command->add_option("--fps", eval.fps, "frames a second: for velocities and false tracks a minute")
+      ->check(CLI::Range(0.001, 100000.0))
+      ->capture_default_str();
+  eval_command
+      ->add_option("--frames", eval.frames, "how many frames the sequence has; 0: up to the last in either file")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1} << 40))
+      ->capture_default_str();
+  eval_command
+      ->add_option("--focal-baseline", eval.focal_baseline,
+                   "focal length times baseline, pixels times the files' unit: compares 3-D errors with the geometry's")
+      ->check(CLI::Range(0.0, 1e12));
   eval_command->add_flag("--json", eval.json, "one JSON object instead of the table");
 
   stereotrack::DisparityArguments disparity;

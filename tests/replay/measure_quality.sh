@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Measures the figures of docs/QUALITY.md and prints its tables (Markdown).
 #   tests/replay/measure_quality.sh BUILD_DIR [DATA_DIR [SECTION...]]
-# SECTION: conveyor people baseball eleven middlebury highway scenes; all without one. SEEDS="1" for fewer.
+# SECTION: conveyor people baseball eleven middlebury highway scenes tracking; all without one. SEEDS="1" for fewer,
+# SCENES="crossing far" for some of tracking's.
 set -euo pipefail
 
 die() {
@@ -14,9 +15,9 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 build=$(cd "$1" && pwd)
 data=${2:-$root/../shared/data}
 sections=("${@:3}")
-((${#sections[@]})) || sections=(conveyor people baseball eleven middlebury highway scenes)
+((${#sections[@]})) || sections=(conveyor people baseball eleven middlebury highway scenes tracking)
 stereotrack=$build/bin/stereotrack
-for program in "$stereotrack" "$build"/tests/{score_masks,score_disparity,score_path,opencv_masks}; do
+for program in "$stereotrack" "$build"/tests/{score_masks,score_disparity,score_path,opencv_masks,opencv_tracker}; do
   [[ -x $program ]] || die "$program: not there; build it first"
 done
 work=$(mktemp -d)
@@ -221,11 +222,61 @@ END
   echo
 }
 
+# Scores of one tracks file as a row. The scenes' cameras have f = 600 px and b = 0.25 m.
+tracking_row() {
+  local scene=$1 seed=$2 method=$3 truth=$4 tracks=$5 frames=$6
+  "$stereotrack" eval --truth "$truth" --tracks "$tracks" --frames "$frames" --focal-baseline 150 --json |
+    awk -F'[:,]' -v head="| $scene | $seed | $method" '
+      {gsub(/[" ]/, "", $1); gsub(/ /, "", $2); got[$1] = $2}
+      function real(key, digits, by) {return got[key] == "null" ? "-" : sprintf("%.*f", digits, by * got[key])}
+      END {
+        printf "%s | %.3f | %.3f | %d | %.3f | %.2f | %s | %s | %s |\n", head, got["hota"], got["idf1"],
+          got["identity_switches"], got["mota"], got["false_tracks_a_minute"], real("position_median", 3, 1),
+          real("position_geometry_median", 2, 1), real("velocity_median", 1, 100)
+      }'
+}
+
+# One configuration for all, the default, and beside it what an afternoon with OpenCV gives.
+measure_tracking() {
+  local scene frames seed folder
+  cat <<END
+| scene | seed | tracker | HOTA | IDF1 | IDSW | MOTA | false tracks a minute | 3-D error median, m | over 1/4 px | velocity error median, % |
+|---|---|---|---|---|---|---|---|---|---|---|
+END
+  while read -r scene frames; do
+    [[ " ${SCENES:-$scene} " == *" $scene "* ]] || continue
+    for seed in ${SEEDS:-1 2 3}; do
+      folder=$work/$scene$seed
+      quiet "$stereotrack" synth "$scene" --seed "$seed" --frames "$frames" --out "$folder"
+      rm -rf "$folder/masks" "$folder/disparity"
+      replay "$folder/out" "$folder"
+      tracking_row "$scene" "$seed" stereotrack "$folder/gt.csv" "$folder/out/tracks.csv" "$frames"
+      quiet "$build/tests/opencv_tracker" "$folder" --calibration "$folder/calibration.yml" --out "$folder/opencv.csv"
+      tracking_row "$scene" "$seed" opencv "$folder/gt.csv" "$folder/opencv.csv" "$frames"
+      rm -rf "$folder"
+    done
+  done <<END
+eleven 600
+crossing 660
+stop-and-go 1170
+crowd 600
+far 600
+fast 660
+dropout 600
+flicker 3600
+dark 3600
+foliage 3600
+shake 3600
+END
+  echo
+}
+
 for section in "${sections[@]}"; do
   case $section in
-    conveyor | people | baseball | eleven | middlebury | highway | scenes) ;;
+    conveyor | people | baseball | eleven | middlebury | highway | scenes | tracking) ;;
     *) die "no section $section" 2 ;;
   esac
-  [[ $section == eleven || $section == scenes || -d $data ]] || die "$data: no recordings there; give their folder as DATA_DIR"
+  [[ $section == eleven || $section == scenes || $section == tracking || -d $data ]] ||
+    die "$data: no recordings there; give their folder as DATA_DIR"
   "measure_$section"
 done

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "pipeline/core/pinned_math.hpp"
 
@@ -48,6 +49,12 @@ class Bounds {
 };
 
 }  // namespace
+
+double Ripple::at(int y, int height) const noexcept {
+  if (amplitude == 0) return 1.0;
+  const double place = phase + turns * y / height;
+  return 1.0 + amplitude * pinned_cos(2.0 * std::numbers::pi * (place - std::floor(place)));
+}
 
 PinholeCamera Rig::camera(int index, int width, int height) const noexcept {
   PinholeCamera camera;

@@ -83,11 +83,31 @@ struct Lamp {
   }
 };
 
+/// Light that pulses faster than the frame rate, as a picture's rows catch it: row y of h gets
+///     1 + amplitude cos(2 pi (phase + turns y / h))
+/// of its light. turns 0: all rows are exposed at once.
+struct Ripple {
+  double amplitude = 0;
+  double phase = 0;  ///< [turns]
+  double turns = 0;  ///< from the first row to the last
+
+  [[nodiscard]] double at(int y, int height) const noexcept;
+};
+
 /// What changes for all of both pictures from one moment to the next.
 struct Moment {
   double exposure = 1;  ///< factor on the gain of both cameras
   double lamp = 0;      ///< how bright the scene's lamp burns
   Sway sway;            ///< where the scene sways
+  Ripple ripple;
+};
+
+/// How one frame's pictures reach whoever pairs them.
+struct Delivery {
+  bool left = true;  ///< false: the picture never comes
+  bool right = true;
+  int right_off = 0;         ///< the right picture is that of so many frames later: -1, 0 or 1
+  std::int64_t skew_ns = 0;  ///< what the time stamps say, right - left; far less than half a period
 };
 
 /// Everything that can be pictured, and who comes by.
@@ -102,6 +122,10 @@ struct Scene {
   std::optional<Foliage> foliage;
   std::function<Moment(double t_s)> moment;  ///< none: nothing changes but the clouds
   bool sways = false;                        ///< the mast; how says `moment`
+  double shutter_s = 0;                      ///< how long a picture is exposed: over 0, what moves is blurred
+  double noise = 1;                          ///< factor on the sensors' noise
+  /// Frames from 1; none: every frame's pictures come, with one stamp. Pure.
+  std::function<Delivery(std::uint64_t frame)> delivery;
   Vec3 horizon_colour;
   Vec3 zenith_colour;
   double act_s = 0;      ///< every so many seconds a new cast comes on, the old one gone

@@ -29,8 +29,9 @@ Sensor::Sensor(const Config& config) : config_(config) {
   }
   for (int level = 0; level < 256; ++level) {
     luma_sigma_[static_cast<std::size_t>(level)] =
-        static_cast<std::int32_t>(std::sqrt(2.9 * 2.9 + 0.022 * level) * (1 << kLevelShift) + 0.5);
+        static_cast<std::int32_t>(std::sqrt(2.9 * 2.9 + 0.022 * level) * config.noise * (1 << kLevelShift) + 0.5);
   }
+  channel_sigma_ = static_cast<std::int32_t>(kChannelSigma * config.noise);
   const double half_diagonal2 =
       0.25 * (static_cast<double>(config.width) * config.width + static_cast<double>(config.height) * config.height);
   column_fall_off_.resize(static_cast<std::size_t>(config.width));
@@ -64,7 +65,7 @@ void Sensor::expose(const float* light, int y, std::uint64_t frame, std::uint8_t
     const std::int32_t common =
         luma_sigma_[static_cast<std::size_t>(luma)] * normal[static_cast<std::size_t>(bits & kMask)];
     for (int c = 0; c < 3; ++c) {
-      const std::int32_t own = kChannelSigma * normal[static_cast<std::size_t>((bits >> (16 * (c + 1))) & kMask)];
+      const std::int32_t own = channel_sigma_ * normal[static_cast<std::size_t>((bits >> (16 * (c + 1))) & kMask)];
       // Sigma x 128 times quantile x 4096.
       const std::int32_t value = (level[c] + ((common + own) >> 12) + (1 << (kLevelShift - 1))) >> kLevelShift;
       bgr[3 * x + 2 - c] = static_cast<std::uint8_t>(std::clamp(value, 0, 255));

@@ -8,13 +8,14 @@ namespace {
 
 constexpr int kWidth = 160;
 constexpr int kHeight = 120;
-constexpr double kStep_s = 0.2;
 constexpr double kPixelArea = 640.0 / kWidth * 480.0 / kHeight;
 constexpr std::array<Offset, 1> kCenter{};
 
 }  // namespace
 
-Survey survey(const Scene& scene, std::span<const Actor> cast_list, double from_s, double to_s) {
+Survey survey(const Scene& scene, std::span<const Actor> cast_list, double from_s, double to_s,
+              const SurveyDetail& detail) {
+  const double step_s = detail.step_s;
   const PinholeCamera camera = scene.rig.camera(0, kWidth, kHeight);
   constexpr Rect kFrame{0, 0, kWidth, kHeight};
   constexpr std::size_t kPixels = static_cast<std::size_t>(kWidth) * kHeight;
@@ -34,8 +35,10 @@ Survey survey(const Scene& scene, std::span<const Actor> cast_list, double from_
   std::vector<double> hidden_until(count * count, -1e9);  // when front hid back last
   std::vector<bool> pair_seen(count * count, false);
   std::vector<Rect> boxes(count);
+  std::vector<double> hidden_for(count, 0.0);
 
-  for (double t = from_s; t < to_s; t += kStep_s) {
+  for (double t = from_s; t < to_s; t += step_s) {
+    int in_view = 0;
     for (std::size_t a = 0; a < count; ++a) {
       boxes[a] = {};
       if (!pose(cast_list[a], t, posed[a])) continue;
@@ -51,7 +54,10 @@ Survey survey(const Scene& scene, std::span<const Actor> cast_list, double from_
       }
     }
     for (std::size_t a = 0; a < count; ++a) {
-      if (boxes[a].empty()) continue;
+      if (boxes[a].empty()) {
+        hidden_for[a] = 0;
+        continue;
+      }
       int inside = 0;
       int visible = 0;
       std::vector<int> hidden_by(count, 0);
@@ -75,8 +81,18 @@ Survey survey(const Scene& scene, std::span<const Actor> cast_list, double from_
       }
       Survey::PerActor& mine = result.actors[a];
       mine.largest_px = std::max(mine.largest_px, visible * kPixelArea);
-      if (visible > 0) mine.seconds_seen += kStep_s;
-      if (inside > 0 && 4 * visible < inside) mine.hidden_s += kStep_s;
+      if (visible > 0) mine.seconds_seen += step_s;
+      if (inside > 0 && visible < (1.0 - detail.hidden_share) * inside) {
+        mine.hidden_s += step_s;
+        hidden_for[a] += step_s;
+        if (hidden_for[a] > mine.longest_hidden_s) {
+          mine.longest_hidden_s = hidden_for[a];
+          mine.longest_hidden_at = t;
+        }
+      } else {
+        hidden_for[a] = 0;
+      }
+      if (4 * visible >= inside && inside > 0) ++in_view;
       for (std::size_t b = 0; b < count; ++b) {
         if (inside < 3 || 4 * hidden_by[b] < inside) continue;
         const std::size_t key = a * count + b;
@@ -87,6 +103,7 @@ Survey survey(const Scene& scene, std::span<const Actor> cast_list, double from_
         pair_seen[pair] = true;
       }
     }
+    result.most_in_view = std::max(result.most_in_view, in_view);
   }
   return result;
 }

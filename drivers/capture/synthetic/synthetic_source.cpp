@@ -57,6 +57,13 @@ SyntheticSource::SyntheticSource(const std::string& name, const SyntheticOptions
   info_.pairs = options.frames;
 
   scene_ = entry.make(options.seed);
+  if (scene_.delivery) {
+    for (std::uint64_t frame = 1; frame <= options.frames; ++frame) {
+      const Delivery d = scene_.delivery(frame);
+      if (d.left || d.right) frames_.push_back(frame);
+    }
+    info_.pairs = frames_.size();
+  }
   call_cast(0.0);
   calibration_ = scene_.rig.calibration(options.width, options.height);
   Random random(mix_bits(options.seed) + 5);
@@ -74,6 +81,7 @@ SyntheticSource::SyntheticSource(const std::string& name, const SyntheticOptions
     config.width = options.width;
     config.height = options.height;
     config.gain = gains[static_cast<std::size_t>(i)] * kExposure;
+    config.noise = scene_.noise;
     sensors_.emplace_back(config);
     pixels_.emplace_back(3U * static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height));
   }
@@ -87,47 +95,133 @@ void SyntheticSource::call_cast(double t_s) {
   act_ = act;
 }
 
+void SyntheticSource::pose_cast(double t_s) {
+  posed_.resize(std::max(posed_.size(), cast_.size()));
+  posed_count_ = 0;
+  for (const Actor& actor : cast_) {
+    if (pose(actor, t_s, posed_[posed_count_])) ++posed_count_;
+  }
+  if (scene_.foliage) scene_.foliage->pose(t_s, foliage_);
+}
+
+/// How many moments make up an exposure: what moves fastest goes on by a pixel from one to the next. Odd, so that one
+/// is the middle.
+int SyntheticSource::exposures(double t_s) {
+  if (scene_.shutter_s <= 0) return 1;
+  constexpr int kMost = 49;
+  const PinholeCamera& camera = views_[0].camera();
+  double farthest_px = 0;
+  PosedActor before;
+  PosedActor after;
+  for (const Actor& actor : cast_) {
+    if (!pose(actor, t_s - 0.5 * scene_.shutter_s, before) || !pose(actor, t_s + 0.5 * scene_.shutter_s, after))
+      continue;
+    if (intersect(screen_box(camera, before.center, before.radius), {0, 0, camera.width, camera.height}).empty() &&
+        intersect(screen_box(camera, after.center, after.radius), {0, 0, camera.width, camera.height}).empty()) {
+      continue;
+    }
+    const Vec3 a = camera.to_camera(before.center);
+    const Vec3 b = camera.to_camera(after.center);
+    if (a.z < 0.5 || b.z < 0.5) continue;
+    const Vec3 moved{a.x / a.z - b.x / b.z, a.y / a.z - b.y / b.z, 0};
+    farthest_px = std::max(farthest_px, camera.f * length(moved));
+  }
+  return std::min(2 * static_cast<int>(0.5 * farthest_px + 0.4) + 1, kMost);
+}
+
+void SyntheticSource::draw(std::uint64_t frame, bool left, bool right) {
+  const double t = static_cast<double>(frame - 1) / options_.fps;
+  call_cast(t);
+  const Moment moment = scene_.moment ? scene_.moment(t) : Moment{};
+  LightLevel level = light_at(options_.seed, t);
+  level.lamp = moment.lamp;
+  const View::Exposure exposure{moment.exposure, moment.ripple, frame};
+  const std::array<bool, 2> wanted{left, right};
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (wanted[i] && scene_.sways) {
+      views_[i].turn(scene_.rig.camera(static_cast<int>(i), options_.width, options_.height, moment.sway));
+    }
+  }
+  const int count = exposures(t);
+  if (left) exposures_ = count;
+  if (left && options_.truth && count > 1) covers_.assign(pixels_[0].size() / 3, {});
+  for (int step = 0; step < count; ++step) {
+    // The middle comes last: the truth is worked out from how everything is posed then.
+    const int half = count / 2;
+    const int k = step < half ? step - half : (step + 1 < count ? step - half + 1 : 0);
+    pose_cast(t + scene_.shutter_s * k / count);
+    const std::span<const PosedActor> actors(posed_.data(), posed_count_);
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (!wanted[i]) continue;
+      views_[i].cast_actors(actors, foliage_);
+      if (count == 1) {
+        views_[i].expose(level, exposure, sensors_[i], pixels_[i].data());
+        continue;
+      }
+      views_[i].gather(level, step == 0);
+      if (i == 0 && options_.truth) cover();
+    }
+  }
+  if (count == 1) return;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (wanted[i]) views_[i].develop(exposure, sensors_[i], pixels_[i].data());
+  }
+}
+
+void SyntheticSource::cover() {
+  const View& view = views_[0];
+  for (int y = 0; y < options_.height; ++y) {
+    const auto [first, last] = view.row_span(y);
+    for (int x = first; x < last; ++x) {
+      const View::Owner owner = view.owner(x, y);
+      if (owner.actor < 0) continue;
+      const std::uint32_t id = posed_[static_cast<std::size_t>(owner.actor)].id;
+      Cover& c =
+          covers_[static_cast<std::size_t>(y) * static_cast<std::size_t>(options_.width) + static_cast<std::size_t>(x)];
+      if (c.id == id) {
+        ++c.count;
+        c.inverse_depth += owner.inverse_depth;
+      } else if (--c.count <= 0) {
+        c = {id, 1, owner.inverse_depth};
+      }
+    }
+  }
+}
+
 Next SyntheticSource::next(FramePair& out) noexcept {
-  if (done_ >= options_.frames) return Next::kEnd;
+  if (done_ >= *info_.pairs) return Next::kEnd;
   ++done_;
   out = {};
   out.ordinal = done_;
-  const auto since = static_cast<double>(done_ - 1);
+  const std::uint64_t frame = frames_.empty() ? done_ : frames_[done_ - 1];
+  const auto since = static_cast<double>(frame - 1);
   out.capture_time = CaptureTime(std::chrono::nanoseconds(static_cast<std::int64_t>(since * 1e9 / options_.fps + 0.5)));
   try {
-    const double t = since / options_.fps;
-    call_cast(t);
-    posed_.resize(std::max(posed_.size(), cast_.size()));
-    posed_count_ = 0;
-    for (const Actor& actor : cast_) {
-      if (pose(actor, t, posed_[posed_count_])) ++posed_count_;
-    }
-    const Moment moment = scene_.moment ? scene_.moment(t) : Moment{};
-    LightLevel level = light_at(options_.seed, t);
-    level.lamp = moment.lamp;
-    if (scene_.foliage) scene_.foliage->pose(t, foliage_);
-    const std::span<const PosedActor> actors(posed_.data(), posed_count_);
-    const auto render = [&](std::size_t i) {
-      if (scene_.sways) {
-        views_[i].turn(scene_.rig.camera(static_cast<int>(i), options_.width, options_.height, moment.sway));
-      }
-      views_[i].cast_actors(actors, foliage_);
-      views_[i].expose(level, moment.exposure, sensors_[i], done_, pixels_[i].data());
-    };
-    render(0);
-    render(1);
+    delivery_ = scene_.delivery ? scene_.delivery(frame) : Delivery{};
+    const bool apart = delivery_.right && delivery_.right_off != 0;
+    if (apart) draw(frame + static_cast<std::uint64_t>(static_cast<std::int64_t>(delivery_.right_off)), false, true);
+    // The truth of the left picture is wanted even where it never comes.
+    draw(frame, true, delivery_.right && !apart);
     if (options_.truth) work_out_truth();
   } catch (const std::exception& e) {
     skip_reason_ = info_.name + ": frame " + std::to_string(done_) + ": " + e.what();
     return Next::kSkipped;
   }
-  const auto picture = [&](std::size_t i) {
-    return Picture{pixels_[i].data(), options_.width, options_.height, std::ptrdiff_t{3} * options_.width,
-                   PixelFormat::kBgr8};
-  };
+  if (!delivery_.left || !delivery_.right) {
+    skip_reason_ = info_.name + ": frame " + std::to_string(done_) + ": the " + (delivery_.left ? "right" : "left") +
+                   " picture is missing";
+    return Next::kSkipped;
+  }
+  if (delivers()) out.skew = std::chrono::nanoseconds(delivery_.skew_ns);
   out.left = picture(0);
   out.right = picture(1);
   return Next::kPair;
+}
+
+Picture SyntheticSource::picture(int side) const noexcept {
+  if (!(side == 0 ? delivery_.left : delivery_.right)) return {};
+  return Picture{pixels_[static_cast<std::size_t>(side)].data(), options_.width, options_.height,
+                 std::ptrdiff_t{3} * options_.width, PixelFormat::kBgr8};
 }
 
 void SyntheticSource::work_out_truth() {
@@ -150,10 +244,18 @@ void SyntheticSource::work_out_truth() {
   std::vector<std::int16_t> owners(pixels);
   std::vector<float> depths(pixels);
   const double disparity_unit = 256.0 * camera.f * scene_.rig.baseline_m;
+  const auto seen = [&](int x, int y, const Cover& cover) {
+    if (4 * cover.count < exposures_) return View::Owner{-1, view.still_inverse_depth(x, y)};
+    const auto posed = std::find_if(posed_.begin(), posed_.begin() + static_cast<std::ptrdiff_t>(posed_count_),
+                                    [&](const PosedActor& a) { return a.id == cover.id; });
+    const auto actor = posed - posed_.begin();
+    if (actor == static_cast<std::ptrdiff_t>(posed_count_)) return View::Owner{-1, view.still_inverse_depth(x, y)};
+    return View::Owner{static_cast<int>(actor), cover.inverse_depth / cover.count};
+  };
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-      const View::Owner owner = view.owner(x, y);
+      const View::Owner owner = exposures_ > 1 ? seen(x, y, covers_[i]) : view.owner(x, y);
       owners[i] = static_cast<std::int16_t>(owner.actor);
       depths[i] = owner.inverse_depth > 0 ? static_cast<float>(1.0 / owner.inverse_depth) : 1e6F;
       truth_.disparity[i] = static_cast<std::uint16_t>(std::min(disparity_unit * owner.inverse_depth + 0.5, 65535.0));

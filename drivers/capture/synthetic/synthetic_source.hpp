@@ -31,6 +31,8 @@ struct SyntheticOptions {
 };
 
 /// What is true of one moving object in one frame; left picture.
+/// Where the scene blurs what moves, a pixel is the object's that shows it for a quarter of the exposure or longer, and
+/// all is that of the middle of the exposure else.
 struct TrueObject {
   std::uint32_t id = 0;        ///< from 1
   Rect box;                    ///< of the visible pixels [px]
@@ -59,7 +61,10 @@ struct GroundTruth {
 
 /// `synthetic:NAME`: a scene ray-cast into two cameras. Pictures are functions of (name, seed, size, fps, ordinal)
 /// alone, the same bits on every machine. At 640 x 480: 2 to 4 s to open (two threads), 20 to 80 ms a pair, 100 ms
-/// where the mast sways or leaves wave.
+/// where the mast sways or leaves wave, up to 500 ms where something fast is blurred.
+///
+/// Where the scene says how pictures are delivered, ordinals count frames of which at least one picture came, as a
+/// folder of pictures has them, so that capture times have gaps; one without its partner is kSkipped.
 class SyntheticSource final : public FrameSource {
  public:
   /// Throws SceneError.
@@ -70,6 +75,13 @@ class SyntheticSource final : public FrameSource {
   [[nodiscard]] const std::string& skip_reason() const noexcept override { return skip_reason_; }
   void skip_to(std::uint64_t ordinal) noexcept override { done_ = ordinal; }
 
+  /// True where each picture has a time stamp of its own and may be missing.
+  [[nodiscard]] bool delivers() const noexcept { return static_cast<bool>(scene_.delivery); }
+  /// How the pictures of the last ordinal came.
+  [[nodiscard]] const synthetic::Delivery& delivery() const noexcept { return delivery_; }
+  /// The picture of one side (0 left, 1 right) of the last ordinal, kSkipped ones too; empty where it never came.
+  [[nodiscard]] Picture picture(int side) const noexcept;
+
   /// Of the two ideal cameras; unit metres.
   [[nodiscard]] const StereoCalibration& calibration() const noexcept { return calibration_; }
   /// Of the last pair; empty unless asked for in the options.
@@ -77,6 +89,10 @@ class SyntheticSource final : public FrameSource {
 
  private:
   void call_cast(double t_s);
+  void pose_cast(double t_s);
+  [[nodiscard]] int exposures(double t_s);
+  void draw(std::uint64_t frame, bool left, bool right);
+  void cover();
   void work_out_truth();
 
   SyntheticOptions options_;
@@ -88,7 +104,9 @@ class SyntheticSource final : public FrameSource {
   std::vector<synthetic::Sensor> sensors_;
   std::vector<std::vector<std::uint8_t>> pixels_;
 
-  std::uint64_t done_ = 0;  ///< last ordinal handed out
+  std::uint64_t done_ = 0;             ///< last ordinal handed out
+  std::vector<std::uint64_t> frames_;  ///< of each ordinal, where the scene says how they come; empty: the same
+  synthetic::Delivery delivery_;
   std::vector<synthetic::Actor> cast_;
   std::int64_t act_ = -1;  ///< whose cast it is
   std::vector<synthetic::PosedActor> posed_;
@@ -96,6 +114,15 @@ class SyntheticSource final : public FrameSource {
   synthetic::PosedFoliage foliage_;
   GroundTruth truth_;
   std::vector<std::uint8_t> stamp_;
+
+  /// While the shutter is open: whom a pixel shows the most (an id, 0 nobody), how often, and the sum of 1 / depth.
+  struct Cover {
+    std::uint32_t id = 0;
+    int count = 0;
+    double inverse_depth = 0;
+  };
+  std::vector<Cover> covers_;
+  int exposures_ = 1;  ///< of the last left picture
 };
 
 /// NAME of `synthetic:NAME`.

@@ -296,59 +296,90 @@ double View::shadow(int x, int y, Shaders shaders) const noexcept {
   return static_cast<double>(sum) / (16.0 * kSamples);
 }
 
-void View::expose(const LightLevel& level, double exposure, const Sensor& sensor, std::uint64_t frame,
-                  std::uint8_t* bgr) {
-  const auto sky = static_cast<float>(level.sky);
-  const auto sun = static_cast<float>(level.sun);
+void View::expose(const LightLevel& level, const Exposure& exposure, const Sensor& sensor, std::uint8_t* bgr) {
   lamp_ = still_.lamp_light.empty() ? 0.0F : static_cast<float>(level.lamp);
   for (int y = 0; y < camera_.height; ++y) {
-    const std::size_t start = 3 * index(0, y);
-    for (std::size_t i = 0; i < row_.size(); ++i)
-      row_[i] = still_.sky_light[start + i] * sky + still_.sun_light[start + i] * sun;
-    if (lamp_ > 0) {
-      for (std::size_t i = 0; i < row_.size(); ++i) row_[i] += still_.lamp_light[start + i] * lamp_;
-    }
-    const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
-    for (int x = first; x < last; ++x) {
-      const std::size_t pixel = index(x, y);
-      const auto lit = static_cast<float>(level.sun * (1.0 - shadow(x, y, Shaders::kAll)));
-      const auto open = static_cast<float>(level.sky * (1.0 - contact_[pixel] / 255.0));
-      const std::size_t out = 3 * static_cast<std::size_t>(x);
-      for (std::size_t c = 0; c < 3; ++c) {
-        row_[out + c] = still_.sky_light[3 * pixel + c] * open + still_.sun_light[3 * pixel + c] * lit;
-      }
-      if (lamp_ > 0) {
-        const float lamp = lamp_ * (1.0F - static_cast<float>(contact_[pixel]) / 255.0F);
-        for (std::size_t c = 0; c < 3; ++c) row_[out + c] += still_.lamp_light[3 * pixel + c] * lamp;
-      }
-      const std::uint16_t* who = &who_[kSamples * pixel];
-      Vec3 sum;
-      int covered = 0;
-      for (std::size_t s = 0; s < kSamples; ++s) {
-        if (who[s] == 0) continue;
-        ++covered;
-        const double u = x + kOffsets[s].x;
-        const double v = y + kOffsets[s].y;
-        const auto depth = static_cast<double>(depth_[kSamples * pixel + s]);
-        sum = sum + (who[s] >= kFirstLeaf ? shade(leaves_[who[s] - kFirstLeaf], s, u, v, depth, level)
-                                          : shade(parts_[who[s] - 1U], s, u, v, depth, level));
-      }
-      if (covered == 0) continue;
-      const float still = static_cast<float>(static_cast<int>(kSamples) - covered) / kSamples;
-      row_[out] = row_[out] * still + static_cast<float>(sum.x / kSamples);
-      row_[out + 1] = row_[out + 1] * still + static_cast<float>(sum.y / kSamples);
-      row_[out + 2] = row_[out + 2] * still + static_cast<float>(sum.z / kSamples);
-    }
-    sensor.expose(row_.data(), y, frame, bgr + start, exposure);
+    light_row(y, level);
+    sensor.expose(row_.data(), y, exposure.frame, bgr + 3 * index(0, y),
+                  exposure.gain * exposure.ripple.at(y, camera_.height));
   }
+}
+
+void View::gather(const LightLevel& level, bool first) {
+  lamp_ = still_.lamp_light.empty() ? 0.0F : static_cast<float>(level.lamp);
+  gathered_.resize(row_.size() * static_cast<std::size_t>(camera_.height));
+  if (first) {
+    std::fill(gathered_.begin(), gathered_.end(), 0.0F);
+    gathers_ = 0;
+  }
+  ++gathers_;
+  for (int y = 0; y < camera_.height; ++y) {
+    light_row(y, level);
+    float* sum = &gathered_[3 * index(0, y)];
+    for (std::size_t i = 0; i < row_.size(); ++i) sum[i] += row_[i];
+  }
+}
+
+void View::develop(const Exposure& exposure, const Sensor& sensor, std::uint8_t* bgr) {
+  const float share = 1.0F / static_cast<float>(gathers_);
+  for (int y = 0; y < camera_.height; ++y) {
+    const float* sum = &gathered_[3 * index(0, y)];
+    for (std::size_t i = 0; i < row_.size(); ++i) row_[i] = sum[i] * share;
+    sensor.expose(row_.data(), y, exposure.frame, bgr + 3 * index(0, y),
+                  exposure.gain * exposure.ripple.at(y, camera_.height));
+  }
+}
+
+void View::light_row(int y, const LightLevel& level) noexcept {
+  const auto sky = static_cast<float>(level.sky);
+  const auto sun = static_cast<float>(level.sun);
+  const std::size_t start = 3 * index(0, y);
+  for (std::size_t i = 0; i < row_.size(); ++i)
+    row_[i] = still_.sky_light[start + i] * sky + still_.sun_light[start + i] * sun;
+  if (lamp_ > 0) {
+    for (std::size_t i = 0; i < row_.size(); ++i) row_[i] += still_.lamp_light[start + i] * lamp_;
+  }
+  const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
+  for (int x = first; x < last; ++x) {
+    const std::size_t pixel = index(x, y);
+    const auto lit = static_cast<float>(level.sun * (1.0 - shadow(x, y, Shaders::kAll)));
+    const auto open = static_cast<float>(level.sky * (1.0 - contact_[pixel] / 255.0));
+    const std::size_t out = 3 * static_cast<std::size_t>(x);
+    for (std::size_t c = 0; c < 3; ++c) {
+      row_[out + c] = still_.sky_light[3 * pixel + c] * open + still_.sun_light[3 * pixel + c] * lit;
+    }
+    if (lamp_ > 0) {
+      const float lamp = lamp_ * (1.0F - static_cast<float>(contact_[pixel]) / 255.0F);
+      for (std::size_t c = 0; c < 3; ++c) row_[out + c] += still_.lamp_light[3 * pixel + c] * lamp;
+    }
+    const std::uint16_t* who = &who_[kSamples * pixel];
+    Vec3 sum;
+    int covered = 0;
+    for (std::size_t s = 0; s < kSamples; ++s) {
+      if (who[s] == 0) continue;
+      ++covered;
+      const double u = x + kOffsets[s].x;
+      const double v = y + kOffsets[s].y;
+      const auto depth = static_cast<double>(depth_[kSamples * pixel + s]);
+      sum = sum + (who[s] >= kFirstLeaf ? shade(leaves_[who[s] - kFirstLeaf], s, u, v, depth, level)
+                                        : shade(parts_[who[s] - 1U], s, u, v, depth, level));
+    }
+    if (covered == 0) continue;
+    const float still = static_cast<float>(static_cast<int>(kSamples) - covered) / kSamples;
+    row_[out] = row_[out] * still + static_cast<float>(sum.x / kSamples);
+    row_[out + 1] = row_[out + 1] * still + static_cast<float>(sum.y / kSamples);
+    row_[out + 2] = row_[out + 2] * still + static_cast<float>(sum.z / kSamples);
+  }
+}
+
+double View::still_inverse_depth(int x, int y) const noexcept {
+  const float depth = still_.center_depth[index(x, y)];
+  return depth < kSkyDepth ? 1.0 / static_cast<double>(depth) : 0.0;
 }
 
 View::Owner View::owner(int x, int y) const noexcept {
   const std::size_t pixel = index(x, y);
-  const auto still = [&] {
-    const float depth = still_.center_depth[pixel];
-    return Owner{-1, depth < kSkyDepth ? 1.0 / static_cast<double>(depth) : 0.0};
-  };
+  const auto still = [&] { return Owner{-1, still_inverse_depth(x, y)}; };
   const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
   if (x < first || x >= last) return still();
   constexpr int kNobody = -1;

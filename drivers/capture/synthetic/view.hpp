@@ -34,8 +34,19 @@ class View {
   void turn(const PinholeCamera& camera);
   /// Casts the actors into this view, and the leaves of a scene that has foliage.
   void cast_actors(std::span<const PosedActor> actors, const PosedFoliage& foliage = {});
+  /// What `expose` needs beside the light.
+  struct Exposure {
+    double gain = 1;
+    Ripple ripple;
+    std::uint64_t frame = 0;
+  };
   /// The picture of the last cast_actors(): width x height, blue green red, rows without gaps.
-  void expose(const LightLevel& level, double exposure, const Sensor& sensor, std::uint64_t frame, std::uint8_t* bgr);
+  void expose(const LightLevel& level, const Exposure& exposure, const Sensor& sensor, std::uint8_t* bgr);
+
+  /// The same of several cast_actors(), each a part of the time for which the shutter is open: gather() after each,
+  /// then develop(). `first` throws away what was gathered before.
+  void gather(const LightLevel& level, bool first);
+  void develop(const Exposure& exposure, const Sensor& sensor, std::uint8_t* bgr);
 
   [[nodiscard]] const PinholeCamera& camera() const noexcept { return camera_; }
 
@@ -45,6 +56,10 @@ class View {
     double inverse_depth = 0;  ///< of the actor or of what stands still [1/m]; 0 for the sky
   };
   [[nodiscard]] Owner owner(int x, int y) const noexcept;
+  /// What would be there if nobody were.
+  [[nodiscard]] double still_inverse_depth(int x, int y) const noexcept;
+  /// What moves in a row lies within [first, last).
+  [[nodiscard]] std::array<int, 2> row_span(int y) const noexcept { return row_span_[static_cast<std::size_t>(y)]; }
   /// How much of its light a pixel of what stands still loses to shadows of actors, 0..1.
   /// Nothing where leaves are.
   [[nodiscard]] double darkening(int x, int y) const noexcept;
@@ -63,6 +78,7 @@ class View {
   static constexpr std::uint16_t kFirstLeaf = 0x4000;
   static_assert(kFirstLeaf + Foliage::kMostLeaves < 0x10000);
 
+  void light_row(int y, const LightLevel& level) noexcept;  ///< fills row_
   void cast_leaves(const PosedFoliage& foliage);
   void cast_shadow(const Part& part);
   void shade_still(const Shape& shape, const Rect& box, std::vector<std::uint8_t>& bits);
@@ -98,6 +114,8 @@ class View {
   std::vector<Rect> dirty_;                   ///< what this frame's actors may have touched
   std::vector<std::array<int, 2>> row_span_;  ///< the same, by rows: first and one past the last column
   std::vector<float> row_;
+  std::vector<float> gathered_;  ///< 3 a pixel; empty until gather()
+  int gathers_ = 0;
   float lamp_ = 0;  ///< how bright the lamp burns
 };
 

@@ -42,8 +42,12 @@ CLEAR          MOTA     MOTP   recall  precision       FP       FN     IDSW     
              66.7 %  100.0 %   66.7 %    100.0 %        0        1        0        0
 identity       IDF1      IDP      IDR       MT       PT       ML
              80.0 %  100.0 %   66.7 %        1        0        1
-3-D error    median     95 %  median/z   95 %/z    pairs  no x y z
-             1.0000   1.0000    10.0 %   10.0 %        2         0
+3-D error    median     95 %  median/z   95 %/z    pairs  no x y z  /(1/4 px)
+             1.0000   1.0000    10.0 %   10.0 %        2         0          -
+velocity     median     95 %    pairs
+                  -        -        0
+false        tracks  a minute
+                  0      0.00
 )");
 }
 
@@ -55,7 +59,23 @@ TEST_F(EvalCommand, JsonIsOneObjectWithRatesAsFractions) {
   EXPECT_THAT(json, HasSubstr("\"idf1\": 0.8,\n"));
   EXPECT_THAT(json, HasSubstr("\"false_negatives\": 1,\n"));
   EXPECT_THAT(json, HasSubstr("\"position_median\": 1,\n"));
-  EXPECT_THAT(json, HasSubstr("\"position_relative_p95\": 0.1\n"));
+  EXPECT_THAT(json, HasSubstr("\"position_relative_p95\": 0.1,\n"));
+  EXPECT_THAT(json, HasSubstr("\"position_geometry_median\": null,\n"));
+  EXPECT_THAT(json, HasSubstr("\"velocity_median\": null,\n"));
+  EXPECT_THAT(json, HasSubstr("\"false_tracks_a_minute\": 0\n"));
+}
+
+// z^2 / (f b) 0.25 = 100 / 50 / 4 = 0.5, and the error is 1. One false track within the tenth of a minute of 60 frames.
+TEST_F(EvalCommand, GeometryAndTimeComeFromTheArguments) {
+  EvalArguments arguments{write("gt.csv", truth_), write("tracks.csv", tracks_ + "2,9,200,0,10,10,0.9,-1,-1,-1\n"),
+                          true};
+  arguments.fps = 10;
+  arguments.frames = 60;
+  arguments.focal_baseline = 50;
+  const std::string json = run(arguments);
+  EXPECT_THAT(json, HasSubstr("\"position_geometry_median\": 2,\n"));
+  EXPECT_THAT(json, HasSubstr("\"false_tracks\": 1,\n"));
+  EXPECT_THAT(json, HasSubstr("\"false_tracks_a_minute\": 10\n"));
 }
 
 TEST_F(EvalCommand, EmptyTracksFileIsScored) {

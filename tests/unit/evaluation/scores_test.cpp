@@ -215,6 +215,68 @@ TEST(Scores, NothingAtAllScoresNothing) {
   EXPECT_EQ(s.idf1, 0.0);
 }
 
+// One metre a second along x, seen as 1.1: a tenth off. The other one goes too slowly to be compared.
+TEST(Scores, VelocityErrorIsThatOfTheWayOfTenFrames) {
+  Truth truth;
+  Tracks tracks;
+  for (int frame = 1; frame <= 25; ++frame) {
+    const double t = frame / 30.0;
+    truth.rows.push_back(at(row(frame, 1, kHere), t, 0, 5));
+    tracks.rows.push_back(at(row(frame, 7, kHere), 1.1 * t + 3, 0, 5));
+    truth.rows.push_back(at(row(frame, 2, kThere), 0.2 * t, 0, 5));
+    tracks.rows.push_back(at(row(frame, 8, kThere), t, 0, 5));
+  }
+  const VelocityError v = evaluate(truth, tracks).velocity;
+  EXPECT_EQ(v.pairs, 15U);
+  EXPECT_NEAR(v.median, 0.1, 1e-12);
+  EXPECT_NEAR(v.p95, 0.1, 1e-12);
+  Options slow;
+  slow.min_speed = 0.1;
+  EXPECT_EQ(evaluate(truth, tracks, slow).velocity.pairs, 30U);
+}
+
+TEST(Scores, VelocityIsNotComparedAcrossAChangeOfTrack) {
+  Truth truth;
+  Tracks tracks;
+  for (int frame = 1; frame <= 18; ++frame) {
+    truth.rows.push_back(at(row(frame, 1, kHere), frame, 0, 5));
+    tracks.rows.push_back(at(row(frame, frame <= 9 ? 7 : 8, kHere), frame, 0, 5));
+  }
+  EXPECT_EQ(evaluate(truth, tracks).velocity.pairs, 0U);
+}
+
+TEST(Scores, PositionErrorIsComparedWithWhatAQuarterOfAPixelIsWorth) {
+  Options options;
+  options.focal_baseline = 150;  // at 6 m: 36 / 150 / 4 = 0.06
+  const Truth truth{{at(row(1, 1, kHere), 0, 0, 6), at(row(1, 2, kThere), 0, 0, 0)}};
+  const Tracks tracks{{at(row(1, 1, kHere), 0, 0, 6.09), at(row(1, 2, kThere), 0, 0, 1)}};
+  const PositionError p = evaluate(truth, tracks, options).position;
+  EXPECT_EQ(p.geometry_pairs, 1U);
+  EXPECT_NEAR(p.geometry_median, 1.5, 1e-9);
+  EXPECT_EQ(evaluate(truth, tracks).position.geometry_pairs, 0U);
+}
+
+TEST(Scores, TrackThatLiesOnNothingForHalfOfItsRowsIsFalse) {
+  const Box part{10, 5, 20, 10};     // within kHere
+  const Box beside{60, 0, 100, 40};  // two fifths of it within kHere
+  Truth truth;
+  Tracks tracks;
+  for (int frame = 1; frame <= 10; ++frame) {
+    truth.rows.push_back(row(frame, 1, kHere, frame % 2));  // not scored now and then
+    tracks.rows.push_back(row(frame, 1, part));
+    tracks.rows.push_back(row(frame, 2, beside));
+    tracks.rows.push_back(row(frame, 3, frame <= 5 ? part : kNowhere));
+    tracks.rows.push_back(row(frame, 4, frame <= 4 ? part : kNowhere));
+    tracks.rows.push_back(row(frame + 10, 5, part));  // nobody is there any more
+  }
+  Options options;
+  const Scores s = evaluate(truth, tracks, options);
+  EXPECT_EQ(s.false_tracks, 3U);  // 2, 4 and 5
+  EXPECT_DOUBLE_EQ(s.false_tracks_a_minute, 3 / (20 / 30.0 / 60));
+  options.frames = 1800;
+  EXPECT_DOUBLE_EQ(evaluate(truth, tracks, options).false_tracks_a_minute, 3);
+}
+
 TEST(Scores, PositionErrorOfMatchedPairs) {
   Truth truth;
   Tracks tracks;

@@ -4,10 +4,12 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
 #include <sstream>
 #include <string>
 
@@ -94,6 +96,68 @@ TEST_F(Synth, WhatHasNeverMovedIsUnknownInTheMaskAndNotScored) {
     EXPECT_THAT(row, testing::MatchesRegex("1,[1-6],[0-9]+,[0-9]+,[0-9]+,[0-9]+,0,.*"));
   }
   EXPECT_EQ(count, 6);
+}
+
+// In the first 100 frames after the 40th there is a fault of each kind.
+TEST_F(Synth, PicturesThatMayBeMissingAreNamedByTheirTimeAndPairsAreTold) {
+  arguments_.frames = 3;  // an earlier run of another scene, whose pictures a replay must not find
+  std::ostringstream messages;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  arguments_.scene = "dropout";
+  arguments_.frames = 140;
+  EXPECT_EQ(run_synth(arguments_, messages), 0);
+  const auto names = [&](const char* side) {
+    std::set<std::string> found;
+    for (const auto& entry : fs::directory_iterator(arguments_.out / side)) {
+      found.insert(entry.path().filename().string());
+      EXPECT_THAT(entry.path().filename().string(), testing::MatchesRegex("[0-9]{10}_[0-9]{9}\\.png"));
+    }
+    return found;
+  };
+  const std::set<std::string> left = names("left");
+  const std::set<std::string> right = names("right");
+  EXPECT_EQ(left.count("1700000000_000000000.png"), 1U);
+  EXPECT_EQ(left.count("1700000000_033333333.png"), 1U);
+
+  std::istringstream pairs(content(arguments_.out / "pairs.csv"));
+  std::string row;
+  ASSERT_TRUE(std::getline(pairs, row));
+  EXPECT_EQ(row, "frame,left,right,right_off,skew_ns");
+  std::set<int> unscored;
+  std::size_t lefts = 0;
+  std::size_t rights = 0;
+  int frames = 0;
+  int wrong = 0;
+  while (std::getline(pairs, row)) {
+    int frame = 0, has_left = 0, has_right = 0, off = 0;
+    long long skew = 0;
+    ASSERT_EQ(std::sscanf(row.c_str(), "%d,%d,%d,%d,%lld", &frame, &has_left, &has_right, &off, &skew), 5) << row;
+    EXPECT_EQ(frame, ++frames);
+    lefts += static_cast<std::size_t>(has_left);
+    rights += static_cast<std::size_t>(has_right);
+    wrong += off != 0 ? 1 : 0;
+    if (off != 0 || has_left == 0 || has_right == 0) unscored.insert(frame);
+    EXPECT_TRUE(fs::exists(
+        arguments_.out / "masks" /
+        (std::string(frame < 100 ? "0000" : "000") + (frame < 10 ? "0" : "") + std::to_string(frame) + ".png")));
+  }
+  EXPECT_LT(frames, 140);  // both pictures were missing
+  EXPECT_EQ(left.size(), lefts);
+  EXPECT_EQ(right.size(), rights);
+  EXPECT_LT(lefts, static_cast<std::size_t>(frames));
+  EXPECT_LT(rights, static_cast<std::size_t>(frames));
+  EXPECT_GE(wrong, 2);
+  std::istringstream truth(content(arguments_.out / "gt.csv"));
+  int scored = 0;
+  while (std::getline(truth, row)) {
+    int frame = 0, confidence = 0;
+    ASSERT_EQ(std::sscanf(row.c_str(), "%d,%*d,%*d,%*d,%*d,%*d,%d,", &frame, &confidence), 2) << row;
+    scored += confidence;
+    if (unscored.count(frame) != 0) {
+      EXPECT_EQ(confidence, 0) << row;
+    }
+  }
+  EXPECT_GT(scored, 50);
 }
 
 TEST_F(Synth, SameArgumentsGiveTheSameBytes) {

@@ -121,7 +121,7 @@ void let_pass(Scene& scene, const Wardrobe& wardrobe, const Passers& passers) {
   scene.prelude_s = kPrelude_s;
   Scene yard = scene;  // for planning, without a cast of its own
   scene.cast = [yard = std::move(yard), wardrobe, passers](std::uint32_t act) {
-    for (std::uint64_t attempt = 0; attempt < 400; ++attempt) {
+    for (std::uint64_t attempt = 0; attempt < 1000; ++attempt) {
       const std::uint64_t key = mix_bits((yard.seed + passers.salt) ^ mix_bits(act * 1000ULL + attempt));
       std::optional<std::vector<Actor>> drawn = Casting(yard, wardrobe, passers, key).draw();
       if (!drawn || !keeps_promises(yard, *drawn)) continue;

@@ -65,13 +65,14 @@ class Troupe {
   [[nodiscard]] static Path enter(Entrance e);
 
   /// Tries what `make` draws until it fits; false when nothing does.
+  /// `gap_m`: how near it may come to others, beyond the discs that they need.
   template <class Make>
-  bool place(Make&& make) {
-    for (int attempt = 0; attempt < 40; ++attempt) {
+  bool place(Make&& make, double gap_m = 0.12, int attempts = 40) {
+    for (int attempt = 0; attempt < attempts; ++attempt) {
       Actor actor = make();
       actor.id = static_cast<std::uint32_t>(cast_.size()) + 1;
       if (actor.path.start_s() < hours_.first_start_s || actor.path.end_s() > hours_.last_exit_s) continue;
-      if (collides(scene_, actor, cast_, 0.12)) continue;
+      if (collides(scene_, actor, cast_, gap_m)) continue;
       cast_.push_back(std::move(actor));
       return true;
     }
