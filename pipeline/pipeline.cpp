@@ -492,6 +492,15 @@ bool Pipeline::is_explained(const Blob& blob) const noexcept {
   });
 }
 
+// What was there has left; until its strip is renewed nothing is known of the background's disparity here.
+void Pipeline::forget_disparity(const Blob& blob) noexcept {
+  const ImageView<const Rectifier::PointF> place = rectifier_->rectified_from_raw();
+  for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
+    const Rectifier::PointF p = place.at(x, y);
+    if (p.valid()) background_disparity_->forget(nearest(p.x), nearest(p.y));
+  });
+}
+
 // Regions that are no object, as a whole: light and marks on the background's own surface, by stereo, and ghosts, by
 // stereo or by their contour, of which the background is told.
 void Pipeline::reject_background() noexcept {
@@ -513,6 +522,7 @@ void Pipeline::reject_background() noexcept {
     const bool ghost =
         !behind && !nearer && !is_explained(blob) && GhostTest::measure(look, blob.box, blob.label).is_ghost();
     if (!behind && !ghost && !(surface && resembles_background(blob.box, blob.label, blob.area))) continue;
+    if (behind) forget_disparity(blob);
     for_each_pixel(blobs_.labels, blob.box, blob.label, [&](int x, int y) {
       blobs_.labels.at(x, y) = 0;
       if (behind) moving_.at(x, y) = AdaptiveBackground::kForget;

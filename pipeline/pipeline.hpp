@@ -144,6 +144,7 @@ class Pipeline {
   void find_disparity() noexcept;
   void match_blob(const Blob& blob) noexcept;
   [[nodiscard]] bool is_explained(const Blob& blob) const noexcept;
+  void forget_disparity(const Blob& blob) noexcept;
   void reject_background() noexcept;
   [[nodiscard]] bool resembles_background(const Rect& box, std::uint16_t label, int area) noexcept;
   [[nodiscard]] ShadowTest::Input shadow_input() const noexcept;

@@ -34,6 +34,12 @@ class BackgroundDisparity {
   /// Nothing is known any more.
   void restart() noexcept;
 
+  /// Nothing is known of this place of the left canvas until its strip is renewed: what was there has left. Places
+  /// outside are ignored.
+  void forget(int x, int y) noexcept {
+    if (map_.contains(x, y)) map_.at(x, y) = kNoDisparity;
+  }
+
   [[nodiscard]] ImageView<const std::uint16_t> map() const noexcept { return map_; }
 
   /// What crosses frames: pipeline/core/state.hpp.

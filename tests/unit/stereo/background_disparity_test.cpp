@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "tests/unit/stereo/identity_rig.hpp"
 
@@ -78,6 +79,21 @@ TEST_F(BackgroundDisparityTest, RestartForgetsAndIsFastAgain) {
 }
 
 // Columns that the rig does not show have no disparity of their own.
+TEST_F(BackgroundDisparityTest, APlaceIsForgottenUntilItsStripIsRenewed) {
+  rig_.show(6);
+  renew(kFrames);
+  for (const auto& [x, y] : {std::pair(-1, 3), std::pair(kWidth, 3), std::pair(3, -1), std::pair(3, kHeight)}) {
+    background_->forget(x, y);
+  }
+  for (int y = 10; y < 40; ++y) background_->forget(kColumn, y);
+  EXPECT_EQ(at(9), 6 * kDisparityScale);
+  EXPECT_EQ(at(10), kNoDisparity);
+  EXPECT_EQ(background_->map().at(kColumn - 1, 10), 6 * kDisparityScale);
+  renew(12);  // rows up to 11
+  EXPECT_EQ(at(11), 6 * kDisparityScale);
+  EXPECT_EQ(at(20), kNoDisparity);
+}
+
 TEST_F(BackgroundDisparityTest, NarrowGapsBetweenEndsThatAgreeAreBridged) {
   const ImageView<std::uint8_t> shown = rig_.arena.image<std::uint8_t>(kWidth, kHeight);
   const auto map_with_gap = [&](int from, int to) {
