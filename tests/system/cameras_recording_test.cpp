@@ -27,8 +27,9 @@ TEST_P(CamerasRecording, OfALiveRunReplaysToTheByteMonoFramesIncluded) {
   const std::string recordings = folder.path().string();
   CameraScene scene(kSceneFormats[GetParam()], milliseconds(25));
   // All of the run is recorded, however long a slow machine takes from the unplugging to the end.
-  LiveRig rig(scene.open(20), {"latency.output_ms=50", "record.on=true", "record.seconds=30", "record.seconds_after=0.2",
-                               "record.on_deadline=false", "record.directory=" + recordings});
+  LiveRig rig(scene.open(20),
+              {"latency.output_ms=50", "record.on=true", "record.seconds=30", "record.seconds_after=0.2",
+               "record.on_deadline=false", "record.directory=" + recordings});
   int stage = 0;
   const auto begun = std::chrono::steady_clock::now();
   rig.run([&] {
