@@ -199,7 +199,7 @@ TEST(LeftRightFolder, SkipToGivesWhatReadingGives) {
   write_recording(dir, {1, 2, 3, 4, 5});
   put_bytes(dir / "left/L_4.png", "broken");
   const auto all = replay_all(dir.path());
-  for (std::uint64_t skipped = 0; skipped <= 6; ++skipped) {
+  for (std::size_t skipped = 0; skipped <= 6; ++skipped) {
     const auto source = open_replay(dir.path().string(), {});
     source->skip_to(skipped);
     const auto rest = ask_all(*source);

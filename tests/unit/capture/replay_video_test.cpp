@@ -88,7 +88,7 @@ TEST(SideBySideVideo, SkipToGivesWhatReadingGives) {
   const std::string file = write_video(dir / "a.avi", 8, 30);
   const auto all = replay_all("sbs:" + file);
   ASSERT_EQ(all.size(), 8U);
-  for (std::uint64_t skipped : {1U, 5U, 8U, 20U}) {
+  for (const std::size_t skipped : {1U, 5U, 8U, 20U}) {
     const auto source = open_replay("sbs:" + file, {});
     source->skip_to(skipped);
     const auto rest = ask_all(*source);

@@ -155,7 +155,7 @@ TEST(OutputSchedule, OnTimeLeavesAtCapturePlusLatencyExactly) {
   for (std::uint64_t i = 1; i <= 4; ++i) rig.pair(i, 10.0 * static_cast<double>(i));
   rig.run_until(50);
   ASSERT_EQ(rig.sent.size(), 4U);
-  for (std::uint64_t i = 1; i <= 4; ++i) {
+  for (std::size_t i = 1; i <= 4; ++i) {
     expect_sent(rig.sent[i - 1], Kind::kOnTime, i, 10.0 * static_cast<double>(i) + 8, i, 8);
   }
   EXPECT_EQ(rig.schedule.counters().on_time, 4U);
@@ -518,7 +518,7 @@ TEST(OutputSchedule, LatencyShorterThanThePipelinePredictsAlways) {
   rig.run_until(210);
   ASSERT_EQ(rig.sent.size(), 20U);
   expect_sent(rig.sent[0], Kind::kPredicted, 1, 18, 0, 0);
-  for (std::uint64_t i = 2; i <= 20; ++i) {
+  for (std::size_t i = 2; i <= 20; ++i) {
     // Decided at 10 i + 7; result i - 1 came at 10 i + 4.
     expect_sent(rig.sent[i - 1], Kind::kPredicted, i, 10.0 * static_cast<double>(i) + 8, i - 1, 18);
   }
@@ -537,7 +537,7 @@ TEST(OutputSchedule, LatencyOfSeveralPeriodsKeepsSlotsInFlightEachWithItsOwnResu
   }
   rig.run_until(1094);
   ASSERT_EQ(rig.sent.size(), 100U);
-  for (std::uint64_t i = 1; i <= 100; ++i) {
+  for (std::size_t i = 1; i <= 100; ++i) {
     expect_sent(rig.sent[i - 1], Kind::kOnTime, i, 10.0 * static_cast<double>(i) + 93, i, 93);
   }
   EXPECT_EQ(most, 9U);  // at 10 i + 6: those exposed from 10 i - 80 on

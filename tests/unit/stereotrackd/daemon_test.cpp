@@ -411,7 +411,7 @@ class Skewed final : public capture::FrameSource {
   [[nodiscard]] const capture::SourceInfo& info() const noexcept override { return scene_.info(); }
   [[nodiscard]] capture::Next next(FramePair& out) noexcept override {
     const capture::Next next = scene_.next(out);
-    if (next == capture::Next::kPair) out.skew = skews_[out.ordinal - 1];
+    if (next == capture::Next::kPair) out.skew = skews_[static_cast<std::size_t>(out.ordinal - 1)];
     return next;
   }
   [[nodiscard]] const std::string& skip_reason() const noexcept override { return scene_.skip_reason(); }

@@ -45,6 +45,9 @@ void sleep_until(std::int64_t ns) {
   }
 }
 
+/// v4l2loopback's own control, by its number in v4l2loopback.h.
+constexpr std::uint32_t kKeepFormat = V4L2_CID_USER_BASE | 0xf000U;
+
 /// What a driver writes of a frame: its rows, without what lies between.
 std::vector<std::uint8_t> bytes_of(const Picture& picture) {
   std::vector<std::uint8_t> bytes;
@@ -75,7 +78,14 @@ Device open_for(const std::string& path, const capture::SourceInfo& info, double
   rate.parm.output.timeperframe = {1000, static_cast<std::uint32_t>(fps * 1000)};
   check(device.ask(VIDIOC_S_PARM, rate), "does not take the rate");
   int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-  check(device.ask(VIDIOC_STREAMON, type), "does not start");
+  const int error = device.ask(VIDIOC_STREAMON, type);
+  if (error == EINVAL) {
+    // From v4l2loopback 0.13 on write(2) starts it, and readers may start before only where the format is kept.
+    v4l2_control keep_format{kKeepFormat, 1};
+    check(device.ask(VIDIOC_S_CTRL, keep_format), "does not keep its format");
+  } else {
+    check(error, "does not start");
+  }
   return device;
 }
 
