@@ -43,7 +43,8 @@ void run_naive(const config::Configuration& configuration, const StereoCalibrati
                                                 .height = info.height,
                                                 .colour = has_colour(info.format),
                                                 .calibration = &calibration,
-                                                .observer = {}},
+                                                .observer = {},
+                                                .decisions = {}},
                                                arena);
   if (!pipeline.has_value()) throw std::runtime_error("no pipeline");
   NaiveQueue<CopiedPair> pairs;

