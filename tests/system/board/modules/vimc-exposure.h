@@ -15,6 +15,7 @@
 
 #include <linux/ktime.h>
 #include <linux/spinlock.h>
+#include <linux/version.h>
 #include <media/v4l2-ctrls.h>
 
 #define VIMC_PIXEL_RATE 12000000
@@ -117,12 +118,16 @@ static void vimc_exposure_init(struct vimc_exposure *e, struct v4l2_ctrl_handler
     vimc_exposure_control(e, handler, V4L2_CID_PIXEL_RATE, VIMC_PIXEL_RATE, VIMC_PIXEL_RATE, 1, VIMC_PIXEL_RATE);
 }
 
-/* The sensor has another size. */
+/* The sensor has another size. From Linux 6.7 on the lock of its controls is that of its state, and held. */
 static void vimc_exposure_size(struct vimc_exposure *e, unsigned int width, unsigned int height)
 {
     e->width = width;
     e->height = height;
+#if LINUX_VERSION_CODE >= KERNEL_VERSION(6, 7, 0)
+    __v4l2_ctrl_modify_range(e->exposure, 1, height + e->blank->cur.val - VIMC_MARGIN, 1, VIMC_EXPOSURE_ROWS);
+#else
     v4l2_ctrl_modify_range(e->exposure, 1, height + e->blank->cur.val - VIMC_MARGIN, 1, VIMC_EXPOSURE_ROWS);
+#endif
 }
 
 static void vimc_exposure_start(struct vimc_exposure *e)
