@@ -78,7 +78,7 @@ class Pipeline {
     bool colour = false;                             ///< the source's formats have colour
     const StereoCalibration* calibration = nullptr;  ///< null: mono
     StageObserver observer;
-    DecisionObserver decisions;  ///< of the detector and the tracker
+    DecisionObserver decisions = {};  ///< of the detector and the tracker
   };
 
   /// Faults: those of the stages. The arena must outlive the pipeline.

@@ -43,8 +43,7 @@ void run_naive(const config::Configuration& configuration, const StereoCalibrati
                                                 .height = info.height,
                                                 .colour = has_colour(info.format),
                                                 .calibration = &calibration,
-                                                .observer = {},
-                                                .decisions = {}},
+                                                .observer = {}},
                                                arena);
   if (!pipeline.has_value()) throw std::runtime_error("no pipeline");
   NaiveQueue<CopiedPair> pairs;

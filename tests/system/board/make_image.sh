@@ -33,6 +33,7 @@ esac
 packages+=(libopencv-{core,imgproc,calib3d,imgcodecs,videoio}"$opencv")
 debian=$2
 modules=(virtio_console virtio_rng virtio_net configfs autofs4 vivid loop irq_sim gpio-sim v4l2loopback vimc)
+if [[ $debian == trixie ]]; then modules+=(pwm-gpio board_pwm); fi
 # Debian's kernel has the disk and its file system as modules.
 disk_modules=(virtio_pci virtio_blk crc32c_generic ext4)
 

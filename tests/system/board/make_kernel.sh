@@ -13,8 +13,8 @@ source "$here/../../../toolchains/debian_packages.sh"
 cross=aarch64-linux-gnu-
 
 case $#-${2:-} in
-  2-bookworm) series=6.1 flavour='' ;;
-  2-trixie) series=6.12 flavour=-rt ;;
+  2-bookworm) series=6.1 flavour='' pwm=() ;;
+  2-trixie) series=6.12 flavour=-rt pwm=(drivers/pwm/pwm-gpio.c) ;;
   *)
     echo "usage: make_kernel.sh FOLDER {bookworm|trixie}" >&2
     exit 2
@@ -50,13 +50,15 @@ cp "$work/tree/usr/bin/busybox" "$folder/busybox"
 mkdir -p "$folder/tree/lib"
 mv "$work/tree/usr/lib/modules" "$folder/tree/lib/"
 
-say "building irq_sim, gpio-sim, vimc, v4l2loopback"
+say "building irq_sim, gpio-sim, vimc, v4l2loopback${pwm:+, pwm-gpio}"
 source=linux-source-$series
 dpkg-deb --fsys-tarfile "$work"/debs/"$source"*.deb | tar -xO "./usr/src/$source.tar.xz" | xz -dc -T2 |
-  tar -x -C "$work" --wildcards "$source/drivers/gpio/*" "$source/drivers/media/test-drivers/vimc/*" "$source/kernel/irq/*"
+  tar -x -C "$work" --wildcards "$source/drivers/gpio/*" "$source/drivers/media/test-drivers/vimc/*" "$source/kernel/irq/*" \
+    "${pwm[@]/#/$source/}"
 mkdir "$work/modules"
 cp "$work/$source"/kernel/irq/irq_sim.c "$work/$source"/drivers/gpio/{gpio-sim.c,gpiolib.h} \
   "$work"/tree/usr/src/v4l2loopback-*/*.[ch] "$here/modules/Kbuild" "$work/modules/"
+if ((${#pwm[@]})); then cp "$work/$source/${pwm[0]}" "$here/modules/board_pwm.c" "$work/modules/"; fi
 cp -r "$work/$source/drivers/media/test-drivers/vimc" "$work/modules/vimc"
 cp "$here/modules/Kbuild.vimc" "$work/modules/vimc/Makefile"
 cp "$here/modules/vimc-exposure.h" "$work/modules/vimc/"

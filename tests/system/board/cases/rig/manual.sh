@@ -43,7 +43,7 @@ follow() {
       *" -f") codes=124 ;;
     esac
     fact "\"$1\": ${command%"${command##*[! ]}"}" ends_with "$codes" "$3" "$command"
-    tail -n 12 /run/said.txt | tell
+    { tail -n 12 /run/said.txt; echo; } | tell
     count=$((count + 1))
   done 4< <(block "$1" "$2")
   fact "block $2 of \"$1\" has commands" test $count -gt 0
