@@ -25,9 +25,7 @@ configure() {
   } >"$configuration"
 }
 # PAIRS_A_SECOND WIDTHxHEIGHT LATENCY_MS [SOURCE], standard input: more. Thirty pairs of a scene, back and forth, without
-# cameras. What leaves within 50 ms of its moment is on time. The emulator's two processors take turns of a tick, 4 ms each
-# while the other one is busy, so that an interrupt waits for its turn, who it wakes for the next one, and who sleeps once
-# more, as the publisher does, for two more: sched_switch and hrtimer_expire_entry show five turns in a row.
+# cameras. What leaves within 20 ms of its moment is on time: the emulated processors are few and slow.
 configure_scene() {
   {
     cat <<END
@@ -40,8 +38,8 @@ width = ${2%x*}
 height = ${2#*x}
 [latency]
 output_ms = $3
-late_ms = 50.0
-grace_ms = 50.0
+late_ms = 20.0
+grace_ms = 20.0
 END
     cat
   } | configure
@@ -58,8 +56,8 @@ runs() { eventually over stereotrack_frames_total "${1:-5}"; }
 ready_after_us() { echo $(($(property ActiveEnterTimestampMonotonic) - $(property InactiveExitTimestampMonotonic))); }
 # CLOCK_MONOTONIC [us].
 now_us() { awk '{ printf "%d", $1 * 1000000 }' /proc/uptime; }
-# Each pair left, but for those on their way, and with its own result. Who is asked for figures keeps a processor of the emulator busy, and the publisher
-# from waking at once, now and then: after_due is no part of this.
+# Each pair left, but for those on their way, and with its own result. Who is asked for figures keeps a processor of the
+# emulator busy, and the publisher from waking at once, now and then: after_due is no part of this.
 all_left() {
   local cause
   for cause in predicted_late predicted_superseded missing overslept_pairs overslept_missing without_state outages; do
