@@ -230,7 +230,11 @@ void Painter::draw_annotation(const Annotation& annotation) {
     const cv::Scalar colour = rejected ? kWarning : kBright;
     const Polyline box = corners(mark.box, scale_);
     draw_line(picture, box, true, {colour, 0.9, 1, mark.kind != Annotation::Kind::kDetection});
-    labels.draw(mark.text, cv::Rect(cv::Point(box[0]), cv::Point(box[2])), kSmall, colour);
+    if (mark.kind == Annotation::Kind::kDetection) {  // inside, where no name of a target is
+      draw_text(picture, mark.text, cv::Point(box[3]) + cv::Point(4, -5), kText, colour);
+    } else {
+      labels.draw(mark.text, cv::Rect(cv::Point(box[0]), cv::Point(box[2])), kSmall, colour);
+    }
   }
   constexpr int kLine_px = 16;
   const auto room = static_cast<std::size_t>(std::max(picture.rows / 3 / kLine_px, 1));

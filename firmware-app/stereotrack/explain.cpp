@@ -193,11 +193,11 @@ void Explanation::explain_others(const FrameResult& result, std::uint32_t id, st
     }
     say(format("    not detection %u: ", decision.detection) + why + "; " + fate(decision.detection));
     if (decision.detection <= result.detections.size()) {
-      annotation_.marks.push_back({result.detections[decision.detection - 1U].box,
-                                   format("detection %u", decision.detection), render::Annotation::Kind::kDetection});
+      annotation_.marks.push_back({result.detections[decision.detection - 1U].box, std::to_string(decision.detection),
+                                   render::Annotation::Kind::kDetection});
     }
   }
-  if (far > 0) say(format("    %d detections are farther away", far));
+  if (far > 0) say(format("    %d more %s farther away", far, far == 1 ? "is" : "are"));
 }
 
 void Explanation::explain_rejected() {
