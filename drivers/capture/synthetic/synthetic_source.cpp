@@ -193,7 +193,7 @@ Next SyntheticSource::next(FramePair& out) noexcept {
   ++done_;
   out = {};
   out.ordinal = done_;
-  const std::uint64_t frame = frames_.empty() ? done_ : frames_[done_ - 1];
+  const std::uint64_t frame = frames_.empty() ? done_ : frames_[static_cast<std::size_t>(done_ - 1)];
   const auto since = static_cast<double>(frame - 1);
   out.capture_time = CaptureTime(std::chrono::nanoseconds(static_cast<std::int64_t>(since * 1e9 / options_.fps + 0.5)));
   try {
