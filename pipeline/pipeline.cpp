@@ -273,6 +273,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
                                 .observer = setup_.decisions};
   for (Detector::Candidate& candidate : detector_->segment(objects)) match_whole(candidate, objects);
   const std::span<const Detection> detections = detector_->conclude(objects);
+  check_pair(detections);
   ended(Stage::kObjects);
   tracker_->update(detections, corners_in(), blobs_.labels);  // 3.25, 3.28-3.32
   ended(Stage::kTracking);
@@ -284,7 +285,8 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
   result.ordinal = pair.ordinal;
   result.capture_time = pair.capture_time;
   result.flags = (both ? 0U : kFlagMono) | (setup_.colour ? 0U : kFlagNoColour) |
-                 (frames_ <= config_.background.frames ? kFlagLearning : 0U) | (light_change_ ? kFlagLightChange : 0U);
+                 (frames_ <= config_.background.frames ? kFlagLearning : 0U) | (light_change_ ? kFlagLightChange : 0U) |
+                 (wrong_pair_ ? kFlagWrongPair : 0U);
   result.left_out = left_out_;
   result.tracks = tracker_->reports();
   result.mask = left_.mask;
@@ -667,6 +669,16 @@ bool Pipeline::fits_at(double disparity, const Rect& roi, double cost) noexcept 
 // Half of the region's pixels look like the background under another light.
 bool Pipeline::resembles_background(const Rect& box, std::uint16_t label, int area) noexcept {
   return shadow_test_->count_resembling(shadow_input(), box, label) * 2 >= area;
+}
+
+void Pipeline::check_pair(std::span<const Detection> detections) noexcept {
+  wrong_pair_ = false;
+  if (!sees_both_) return;
+  const PairCheck::Verdict verdict = pair_check_.run(predictions_, detections, dt_);
+  if (!verdict.wrong) return;
+  wrong_pair_ = true;
+  detector_->distrust_depth();
+  setup_.decisions.tell(WrongPair{verdict.lag_s, verdict.witnesses});
 }
 
 void Pipeline::learn_background() noexcept {

@@ -25,6 +25,7 @@
 #include "pipeline/stereo/background_disparity.hpp"
 #include "pipeline/stereo/block_matcher.hpp"
 #include "pipeline/stereo/region_matcher.hpp"
+#include "pipeline/track/pair_check.hpp"
 #include "pipeline/track/track_report.hpp"
 
 namespace stereotrack {
@@ -50,6 +51,7 @@ enum FrameFlag : std::uint32_t {
   kFlagNoColour = 2,     ///< grey source: the chroma tests did not run
   kFlagLearning = 4,     ///< fewer than background.frames frames seen so far
   kFlagLightChange = 8,  ///< so much changed at once that the background starts anew
+  kFlagWrongPair = 16,   ///< what moves tells that the right picture is of another instant: its depths are not used
 };
 
 /// What one pair gave. Views live until the pipeline's next run.
@@ -152,6 +154,7 @@ class Pipeline {
   void refine_blobs() noexcept;
   void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
   [[nodiscard]] bool fits_at(double disparity, const Rect& roi, double cost) noexcept;
+  void check_pair(std::span<const Detection> detections) noexcept;
   void learn_background() noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
   [[nodiscard]] ImageView<const std::uint16_t> disparity_now() const noexcept;
@@ -166,6 +169,7 @@ class Pipeline {
   bool light_change_ = false;
   EffortBits left_out_ = 0;  ///< in this frame
   bool sees_both_ = false;   ///< in this frame: there are two views
+  bool wrong_pair_ = false;  ///< in this frame
   int frames_ = 0;           ///< seen, counted to one more than background.frames
   int full_range_ = 0;
   CaptureTime last_time_{};
@@ -210,6 +214,7 @@ class Pipeline {
   std::optional<BackgroundDisparity> background_disparity_;
   std::optional<RegionMatcher> region_matcher_;
   std::optional<Detector> detector_;
+  PairCheck pair_check_;
   std::optional<Tracker> tracker_;
 };
 static_assert(RealTimeStage<Pipeline, &Pipeline::run, &Pipeline::save_state, &Pipeline::copy_state_part>);

@@ -17,7 +17,7 @@ void Pipeline::visit_state(Self& self, Archive& archive) noexcept {
   archive(self.equalise_left_, self.equalise_right_);
   archive(self.mean_y_, self.mean_cb_, self.mean_cr_);
   archive(self.background_left_, self.background_right_, self.background_disparity_);
-  archive(self.convex_hull_, self.detector_, self.tracker_);
+  archive(self.convex_hull_, self.detector_, self.pair_check_, self.tracker_);
 }
 
 // What gives the state its form and its meaning; all of the configuration is for who keeps the block to compare.

@@ -34,6 +34,7 @@ enum Flag : std::uint32_t {
   kClockStepped = 512,  ///< of the capture clock, since the message before
   kStateAtOutput =
       1024,  ///< positions, velocities, covariances are predicted to when the message is due, not of capture
+  kWrongPair = 2048,  ///< both pictures are not of one instant, told by what moves: no depth was measured
 };
 
 /// Bits of Live::health and Status::health: what is wrong now.
@@ -55,6 +56,7 @@ enum Health : std::uint32_t {
   kHealthHot = 16384,
   kHealthLeftAstray = 32768,
   kHealthRightAstray = 65536,
+  kHealthWrongPairs = 131072,
 };
 
 /// What only a live rig knows about a pair; a replay has none. With a status: about now, without skew and exposures.

@@ -32,7 +32,8 @@ static_assert(same(stereotrack_Flag_FLAG_MONO, kMono) && same(stereotrack_Flag_F
               same(stereotrack_Flag_FLAG_PREDICTED, kPredicted) &&
               same(stereotrack_Flag_FLAG_EFFORT_SHED, kEffortShed) &&
               same(stereotrack_Flag_FLAG_CLOCK_STEPPED, kClockStepped) &&
-              same(stereotrack_Flag_FLAG_STATE_AT_OUTPUT, kStateAtOutput));
+              same(stereotrack_Flag_FLAG_STATE_AT_OUTPUT, kStateAtOutput) &&
+              same(stereotrack_Flag_FLAG_WRONG_PAIR, kWrongPair));
 constexpr bool same(std::uint32_t schema, Health ours) noexcept { return schema == ours; }
 static_assert(same(stereotrack_Health_HEALTH_NO_PAIRS, kHealthNoPairs) &&
               same(stereotrack_Health_HEALTH_LEFT_SILENT, kHealthLeftSilent) &&
@@ -50,7 +51,8 @@ static_assert(same(stereotrack_Health_HEALTH_NO_PAIRS, kHealthNoPairs) &&
               same(stereotrack_Health_HEALTH_ALLOCATED, kHealthAllocated) &&
               same(stereotrack_Health_HEALTH_HOT, kHealthHot) &&
               same(stereotrack_Health_HEALTH_LEFT_ASTRAY, kHealthLeftAstray) &&
-              same(stereotrack_Health_HEALTH_RIGHT_ASTRAY, kHealthRightAstray));
+              same(stereotrack_Health_HEALTH_RIGHT_ASTRAY, kHealthRightAstray) &&
+              same(stereotrack_Health_HEALTH_WRONG_PAIRS, kHealthWrongPairs));
 
 /// Writes `value` as float32; false if that is not finite.
 bool put(double value, float& out) noexcept {

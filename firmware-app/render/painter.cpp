@@ -144,14 +144,15 @@ void Painter::draw_header(const FrameResult& result) {
   std::snprintf(text.data(), text.size(), "%td target%s", targets, targets == 1 ? "" : "s");
   draw_text(header, text.data(), {236, kBase}, kText, kBright);
 
-  constexpr std::array<std::pair<FrameFlag, const char*>, 4> kWords{{{kFlagMono, "mono"},
+  constexpr std::array<std::pair<FrameFlag, const char*>, 5> kWords{{{kFlagMono, "mono"},
                                                                      {kFlagNoColour, "grey"},
                                                                      {kFlagLearning, "learning background"},
-                                                                     {kFlagLightChange, "light change"}}};
+                                                                     {kFlagLightChange, "light change"},
+                                                                     {kFlagWrongPair, "wrong pair"}}};
   int x = 350;
   for (const auto& [flag, word] : kWords) {
     if ((result.flags & flag) == 0) continue;
-    const bool passing = flag == kFlagLearning || flag == kFlagLightChange;
+    const bool passing = flag != kFlagMono && flag != kFlagNoColour;
     draw_text(header, word, {x, kBase}, kText, passing ? kWarning : kFaint);
     x += text_size(word, kText).width + 18;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <set>
@@ -96,9 +97,14 @@ void Explanation::rejected(void* self, const RejectedCandidate& candidate) noexc
   }
 }
 
+void Explanation::mispaired(void* self, const WrongPair& pair) noexcept {
+  static_cast<Explanation*>(self)->wrong_pair_ = pair;
+}
+
 void Explanation::frame_begins() noexcept {
   decisions_.clear();
   rejected_.clear();
+  wrong_pair_.reset();
   left_out_ = 0;
 }
 
@@ -112,6 +118,11 @@ const render::Annotation& Explanation::frame_ends(const FrameResult& result, dou
   }
   if (ids.empty() && (request_.id != 0 || !wanted)) return annotation_;
   say(format("frame %llu, %.3f s", static_cast<unsigned long long>(result.ordinal), seconds));
+  if (wrong_pair_) {
+    say(format("  wrong pair: the right picture is %.0f ms %s than the left one, told by %d target%s; no depth is taken",
+               1000 * std::abs(wrong_pair_->lag_s), wrong_pair_->lag_s > 0 ? "later" : "earlier",
+               wrong_pair_->witnesses, wrong_pair_->witnesses == 1 ? "" : "s"));
+  }
   if (request_.id == 0) explain_detections(result);
   for (const std::uint32_t id : ids) explain_target(result, id);
   explain_rejected();

@@ -27,7 +27,7 @@ class Explanation {
   /// unit_m: metres in one unit of the calibration, 0 = not known.
   Explanation(const ExplainRequest& request, const PipelineConfig& config, double unit_m);
 
-  [[nodiscard]] DecisionObserver observer() noexcept { return {&Explanation::decided, &Explanation::rejected, this}; }
+  [[nodiscard]] DecisionObserver observer() noexcept { return {&Explanation::decided, &Explanation::rejected, &Explanation::mispaired, this}; }
 
   /// Before each frame.
   void frame_begins() noexcept;
@@ -38,6 +38,7 @@ class Explanation {
  private:
   static void decided(void* self, const Decision& decision) noexcept;
   static void rejected(void* self, const RejectedCandidate& candidate) noexcept;
+  static void mispaired(void* self, const WrongPair& pair) noexcept;
   void say(std::string line) { annotation_.lines.push_back(std::move(line)); }
   void explain_detections(const FrameResult& result);
   void explain_target(const FrameResult& result, std::uint32_t id);
@@ -52,6 +53,7 @@ class Explanation {
   double unit_m_ = 0;
   std::vector<Decision> decisions_;
   std::vector<RejectedCandidate> rejected_;
+  std::optional<WrongPair> wrong_pair_;
   std::size_t left_out_ = 0;
   Rect last_box_;
   render::Annotation annotation_;

@@ -66,7 +66,7 @@ std::string bit_names(std::uint32_t bits, std::span<const BitName> names) {
 }
 
 std::string flag_names(std::uint32_t flags) {
-  static constexpr std::array<BitName, 11> kNames{{
+  static constexpr std::array<BitName, 12> kNames{{
       {telemetry::kMono, "mono"},
       {telemetry::kNoColour, "no-colour"},
       {telemetry::kBackgroundLearning, "learning"},
@@ -78,12 +78,13 @@ std::string flag_names(std::uint32_t flags) {
       {telemetry::kEffortShed, "effort-shed"},
       {telemetry::kClockStepped, "clock-stepped"},
       {telemetry::kStateAtOutput, "state-at-output"},
+      {telemetry::kWrongPair, "wrong-pair"},
   }};
   return bit_names(flags, kNames);
 }
 
 std::string health_names(std::uint32_t health) {
-  static constexpr std::array<BitName, 17> kNames{{
+  static constexpr std::array<BitName, 18> kNames{{
       {telemetry::kHealthNoPairs, "no-pairs"},
       {telemetry::kHealthLeftSilent, "left-silent"},
       {telemetry::kHealthRightSilent, "right-silent"},
@@ -101,6 +102,7 @@ std::string health_names(std::uint32_t health) {
       {telemetry::kHealthHot, "hot"},
       {telemetry::kHealthLeftAstray, "left-astray"},
       {telemetry::kHealthRightAstray, "right-astray"},
+      {telemetry::kHealthWrongPairs, "wrong-pairs"},
   }};
   return health == 0 ? "good" : bit_names(health, kNames);
 }

@@ -47,6 +47,7 @@ std::uint32_t telemetry_flags(std::uint32_t flags, bool skipped_before) {
   if ((flags & kFlagNoColour) != 0) out |= telemetry::kNoColour;
   if ((flags & kFlagLearning) != 0) out |= telemetry::kBackgroundLearning;
   if ((flags & kFlagLightChange) != 0) out |= telemetry::kLightChange;
+  if ((flags & kFlagWrongPair) != 0) out |= telemetry::kWrongPair;
   if (skipped_before) out |= telemetry::kFramesSkippedBefore;
   return out;
 }
@@ -255,6 +256,7 @@ class Replay {
       summary_.pair_skews_us.push_back(std::abs(std::chrono::duration<double, std::micro>(*pair.skew).count()));
     }
     summary_.flags |= result->flags;
+    summary_.wrong_pairs += (result->flags & kFlagWrongPair) != 0 ? 1 : 0;
     for (std::size_t i = 0; i < kRejections; ++i) summary_.rejections[i] += result->rejections[i];
     summary_.hulls_reduced = result->hulls_reduced;
     tracks_.add(pair.ordinal, result->tracks);

@@ -96,6 +96,7 @@ void save_summary(const std::filesystem::path& path, const Summary& summary, con
   } else {
     json["pair_skew_us"] = json_of(percentiles(summary.pair_skews_us));
   }
+  json["wrong_pairs"] = summary.wrong_pairs;
   json["tracks"] = summary.tracks;
   json["rows"] = summary.rows;
   json["deadline_misses"] = summary.deadline_misses;

@@ -62,6 +62,7 @@ struct Summary {
   std::uint64_t skipped = 0;              ///< pairs that could not be read
   std::vector<std::string> skip_reasons;  ///< the first hundred
   std::vector<double> pair_skews_us;      ///< |right - left capture time| of each pair whose source has both
+  std::uint64_t wrong_pairs = 0;          ///< of two instants, told by what moves: kFlagWrongPair
   std::uint64_t tracks = 0;               ///< confirmed ones
   std::uint64_t rows = 0;                 ///< of tracks.csv
   std::uint32_t flags = 0;                ///< FrameFlag bits of all frames together

@@ -60,6 +60,7 @@ void FrameLoop::process(Pipeline& pipeline, capture::PairLease lease) noexcept {
   }
 
   vitals_.frames.add();
+  if ((result->flags & kFlagWrongPair) != 0) vitals_.wrong_pairs.add();
   vitals_.compute.record((done - began).count());
   vitals_.capture_to_result.record((done - captured).count());
   const std::chrono::nanoseconds left = captured + config_.latency - config_.lead - began;

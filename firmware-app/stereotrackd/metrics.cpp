@@ -193,6 +193,8 @@ std::string metrics_text(const Daemon& daemon, std::uint64_t session) {
   text.gauge("skew_max_microseconds", "Largest distance of the two exposures of a pair.", vitals.skew_max_us.get());
   text.counter("exposures_differ_total", "Pairs exposed differently, over camera.exposure_limit_percent.",
                vitals.exposures_differ.get());
+  text.counter("wrong_pairs_total", "Pairs whose pictures are not of one instant, told by what moves; no depth taken.",
+               vitals.wrong_pairs.get());
 
   text.family("outputs_total", "counter", "Slots of the latency contract by how they ended, and what was refused.");
   for (std::size_t i = 0; i < kScheduleCounters.size(); ++i) {

@@ -26,6 +26,7 @@ std::uint32_t wire_flags(std::uint32_t flags) noexcept {
   if ((flags & kFlagNoColour) != 0) out |= telemetry::kNoColour;
   if ((flags & kFlagLearning) != 0) out |= telemetry::kBackgroundLearning;
   if ((flags & kFlagLightChange) != 0) out |= telemetry::kLightChange;
+  if ((flags & kFlagWrongPair) != 0) out |= telemetry::kWrongPair;
   return out;
 }
 
@@ -321,6 +322,8 @@ void Publisher::judge_health() noexcept {
   tell_if(right_astray, telemetry::kHealthRightAstray);
   tell_if(vitals_.skew_over.get() != skew_over_seen_, telemetry::kHealthSkew);
   tell_if(vitals_.exposures_differ.get() != exposures_differ_seen_, telemetry::kHealthExposuresDiffer);
+  const std::uint64_t wrong_pairs = vitals_.wrong_pairs.get();
+  tell_if(std::exchange(wrong_pairs_seen_, wrong_pairs) != wrong_pairs, telemetry::kHealthWrongPairs);
   skew_over_seen_ = vitals_.skew_over.get();
   exposures_differ_seen_ = vitals_.exposures_differ.get();
   tell_if(misses != misses_seen_, telemetry::kHealthDeadlinesMissed);

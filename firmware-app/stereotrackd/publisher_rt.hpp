@@ -155,6 +155,7 @@ class Publisher {
   std::uint64_t skew_over_seen_ = 0;
   std::uint64_t trigger_failures_seen_ = 0;
   std::uint64_t exposures_differ_seen_ = 0;
+  std::uint64_t wrong_pairs_seen_ = 0;
   capture::SourceFigures cameras_;  ///< at the last judgement
   std::uint64_t lines_failed_seen_ = 0;
   telemetry::SinkCounters before_;  ///< of plans that were replaced

@@ -55,6 +55,7 @@ struct Vitals {
   Counter frames;                        ///< pairs that went through the pipeline
   Counter frames_left;                   ///< pairs that waited when the loop ended
   Counter frames_refused;                ///< pairs that the pipeline had a fault with
+  Counter wrong_pairs;                   ///< pairs of two instants, told by what moves: kFlagWrongPair
   Counter frame_allocations;             ///< heap calls after warm-up
   Counter efforts_left_out;              ///< now: EffortBits
   Counter efforts_shed;                  ///< times that an effort was given up

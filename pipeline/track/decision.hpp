@@ -110,11 +110,18 @@ struct RejectedCandidate {
   double disparity = 0;  ///< [px]
 };
 
+/// A pair of which both pictures do not show one instant: PairCheck.
+struct WrongPair {
+  double lag_s = 0;   ///< the right picture was taken so much later than the left one [s]
+  int witnesses = 0;  ///< targets that told
+};
+
 /// Told why, while it happens; the thread of the pipeline. Without one nothing is worked out for it. The functions must
 /// return at once; what they are given is theirs only until then.
 struct DecisionObserver {
   void (*decided)(void* context, const Decision& decision) noexcept = nullptr;
   void (*rejected)(void* context, const RejectedCandidate& candidate) noexcept = nullptr;
+  void (*mispaired)(void* context, const WrongPair& pair) noexcept = nullptr;
   void* context = nullptr;
 
   void tell(const Decision& decision) const noexcept {
@@ -122,6 +129,9 @@ struct DecisionObserver {
   }
   void tell(const RejectedCandidate& candidate) const noexcept {
     if (rejected != nullptr) rejected(context, candidate);
+  }
+  void tell(const WrongPair& pair) const noexcept {
+    if (mispaired != nullptr) mispaired(context, pair);
   }
 };
 

@@ -563,6 +563,13 @@ void Detector::reject(const Input& in, const Candidate& candidate, Rejection why
   in.observer.tell(RejectedCandidate{why, candidate.box, candidate.area, candidate.has_depth, candidate.disparity});
 }
 
+void Detector::distrust_depth() noexcept {
+  for (Detection& detection : detections_) {
+    detection.has_depth = false;
+    detection.may_begin = false;
+  }
+}
+
 std::span<const Detection> Detector::conclude(const Input& in) noexcept {
   detections_.clear();
   // A candidate is large: their places are sorted.

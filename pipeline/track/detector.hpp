@@ -98,6 +98,10 @@ class Detector {
   /// Rejects, and makes detections of the rest, largest first. Valid until the next conclude().
   [[nodiscard]] std::span<const Detection> conclude(const Input& in) noexcept;
 
+  /// The right picture was of another instant: the detections of the last conclude() are left without depth, and none
+  /// may begin a target, for they were cut and judged by it.
+  void distrust_depth() noexcept;
+
   /// Rejected candidates of the last run.
   [[nodiscard]] const RejectionCounts& rejections() const noexcept { return rejections_; }
   [[nodiscard]] std::uint64_t hulls_reduced() const noexcept { return hull_.reduced(); }  ///< see ConvexHull

@@ -151,6 +151,7 @@ std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uin
     if (prediction.has_depth) {
       prediction.disparity = view_.focal_baseline / z;
       prediction.disparity_sd = prediction.disparity / z * std::sqrt(target.space.position_covariance()(2, 2));
+      prediction.disparity_rate = -prediction.disparity / z * target.space.velocity().z();
     }
     prediction.appearance = &target.appearance;
     prediction.disparity_reach = target.disparity_reach;
@@ -684,7 +685,7 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
     return !why;
   });
   for (std::size_t j = 0; j < detections.size(); ++j) {
-    if (detection_used_[j] == 0) start(detections[j], static_cast<std::uint16_t>(j + 1));
+    if (detection_used_[j] == 0 && detections[j].may_begin) start(detections[j], static_cast<std::uint16_t>(j + 1));
   }
   for (Target& target : targets_) follow_parent(target);
   drop_twins();

@@ -250,7 +250,7 @@ TEST(Painter, FlagsTargetsAndTimeChangeTheHeader) {
   EXPECT_EQ(cv::norm(plain, header(0, 2, 3), cv::NORM_INF), 0);  // a tentative track is no target
   EXPECT_GT(cv::norm(plain, header(0, 2, 1), cv::NORM_INF), 0);
   EXPECT_GT(cv::norm(plain, header(0, 3, 2), cv::NORM_INF), 0);
-  for (const std::uint32_t flag : {kFlagMono, kFlagNoColour, kFlagLearning, kFlagLightChange}) {
+  for (const std::uint32_t flag : {kFlagMono, kFlagNoColour, kFlagLearning, kFlagLightChange, kFlagWrongPair}) {
     EXPECT_GT(cv::norm(plain, header(flag, 2, 2), cv::NORM_INF), 0) << flag;
   }
 }

@@ -28,7 +28,7 @@ TEST(SideBySide, TheRightViewBeginsHalfARowOn) {
 
 // 8 pixels are 8, 16, 24 and 10 bytes; the colour rows of kNv12 are as long as the others.
 TEST(SideBySide, BytesAreCountedByTheFormat) {
-  const std::uint8_t memory[1] = {};
+  const std::uint8_t memory[96] = {};
   const auto skipped = [&](PixelFormat format) {
     return split_side_by_side({memory, 16, 2, 99, format}).right.data - memory;
   };

@@ -31,7 +31,7 @@ struct Link {
     for (std::size_t i = kFaults - 1; i > 0; --i) {
       std::swap(order[i], order[static_cast<std::size_t>(shuffle.below(static_cast<int>(i) + 1))]);
     }
-    const Fault fault = order[block % kFaults];
+    const Fault fault = order[static_cast<std::size_t>(block % kFaults)];
     constexpr std::array<int, kFaults> kMost{3, 3, 5, 8, 4};
     Random random(mix_bits(key ^ (block << 20U)));
     const auto begin = static_cast<std::uint64_t>(4 + random.below(7));
