@@ -103,6 +103,21 @@ void fill_from_bits(const std::uint64_t* words, int width, std::uint8_t* pixels)
   for (; x < width; ++x) pixels[x] = (words[x / 64] >> x % 64 & 1) != 0 ? 255 : 0;
 }
 
+void clear_where_bits(const std::uint64_t* words, int width, std::uint8_t* pixels) noexcept {
+  for (int x = 0; x < width; x += 64) {
+    const std::uint64_t bits = words[x / 64];
+    if (bits == 0) continue;
+    const int count = std::min(width - x, 64);
+    if (bits == ~std::uint64_t{0}) {
+      std::memset(pixels + x, 0, static_cast<std::size_t>(count));
+      continue;
+    }
+    for (int i = 0; i < count; ++i) {
+      if ((bits >> i & 1) != 0) pixels[x + i] = 0;
+    }
+  }
+}
+
 void row_bits(const std::uint8_t* pixels, int width, std::uint64_t* words) noexcept {
   const int done = simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(words_of)(pixels, width, words);
   row_bits_reference(pixels + 64 * done, width - 64 * done, words + done);

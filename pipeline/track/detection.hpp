@@ -24,6 +24,7 @@ struct Detection {
   bool whole = true;      ///< no target shares its segment of depth
   int region = 0;         ///< connected region of the foreground of which it is a part, 0 = its own alone
   double strength = 0;    ///< 0..1, how far above the foreground threshold it stands
+  bool may_begin = true;  ///< false: it may be a known target's, but no target begins with it
 
   [[nodiscard]] double centre_x() const noexcept { return box.left + (box.width - 1) * 0.5; }
   [[nodiscard]] double centre_y() const noexcept { return box.top + (box.height - 1) * 0.5; }

@@ -15,6 +15,7 @@
 #include "pipeline/track/decision.hpp"
 #include "pipeline/track/depth_segments.hpp"
 #include "pipeline/track/detection.hpp"
+#include "pipeline/track/zone_rules.hpp"
 
 namespace stereotrack {
 
@@ -64,6 +65,7 @@ class Detector {
     ImageView<const std::uint8_t> strength;  ///< distance to the background, any unit
     std::span<const Prediction> predictions;
     const Rectifier* rectifier = nullptr;  ///< null for mono
+    const ZoneRules* rules = nullptr;      ///< what is tracked where; null: everything everywhere
     DecisionObserver observer;             ///< of what is rejected
   };
 
@@ -136,7 +138,7 @@ class Detector {
                                      const Rect& united) const noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
   void reject(Rejection why) noexcept { ++rejections_[static_cast<std::size_t>(why)]; }
-  void reject(const Input& in, const Candidate& candidate, Rejection why) noexcept;
+  void reject(const Input& in, const Candidate& candidate, Rejection why, double size_m = 0) noexcept;
 
   Config config_;
   int width_ = 0;
