@@ -105,15 +105,12 @@ void fill_from_bits(const std::uint64_t* words, int width, std::uint8_t* pixels)
 
 void clear_where_bits(const std::uint64_t* words, int width, std::uint8_t* pixels) noexcept {
   for (int x = 0; x < width; x += 64) {
-    const std::uint64_t bits = words[x / 64];
-    if (bits == 0) continue;
-    const int count = std::min(width - x, 64);
-    if (bits == ~std::uint64_t{0}) {
-      std::memset(pixels + x, 0, static_cast<std::size_t>(count));
-      continue;
-    }
-    for (int i = 0; i < count; ++i) {
-      if ((bits >> i & 1) != 0) pixels[x + i] = 0;
+    // Run by run: a mask's words are mostly all of one kind.
+    for (std::uint64_t bits = words[x / 64]; bits != 0;) {
+      const int begin = std::countr_zero(bits);
+      const int count = std::countr_one(bits >> begin);
+      std::memset(pixels + x + begin, 0, static_cast<std::size_t>(count));
+      bits = begin + count == 64 ? 0 : bits & ~std::uint64_t{0} << (begin + count);
     }
   }
 }
