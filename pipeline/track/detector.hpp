@@ -97,7 +97,7 @@ class Detector {
   /// objects, where single pixels have none) before conclude(). Valid until the next segment().
   [[nodiscard]] std::span<Candidate> segment(const Input& in) noexcept;
 
-  /// Rejects, and makes detections of the rest, largest first. Valid until the next conclude().
+  /// Rejects, by in.rules last, and makes detections of the rest, largest first. Valid until the next conclude().
   [[nodiscard]] std::span<const Detection> conclude(const Input& in) noexcept;
 
   /// Rejected candidates of the last run.
