@@ -168,9 +168,10 @@ struct TelemetryConfig {
 
 /// Which point of a target has to lie in a zone of the picture.
 enum class ZoneAnchor : unsigned char { kCentre, kBottom };
+enum class ZoneTargets : unsigned char { kAll, kNoneBegin, kIgnore };
 
-/// [[zone]]: where a target may be. Either a box in space or a polygon in the picture. See
-/// firmware-app/signals/zone.hpp.
+/// [[zone]]: a place, for signals, and what is tracked there. Either a box in space or a polygon in the picture. See
+/// pipeline/track/zone.hpp and pipeline/track/zone_rules.hpp.
 struct ZoneConfig {
   std::string name;
   std::array<double, 2> x_m{};  ///< [m]; 0, 0: anywhere
@@ -178,6 +179,9 @@ struct ZoneConfig {
   std::array<double, 2> z_m{};
   std::vector<std::array<double, 2>> picture;  ///< corners [px]; empty: a box in space
   ZoneAnchor anchor = ZoneAnchor::kCentre;
+  ZoneTargets targets = ZoneTargets::kAll;
+  double min_size_m = 0;  ///< [m]; 0: that of pipeline.zones
+  double max_size_m = 0;
   friend bool operator==(const ZoneConfig&, const ZoneConfig&) = default;
 };
 
@@ -236,6 +240,11 @@ struct RecordConfig {
   bool on_input = true;
 };
 
+/// What of [objects] is not the stages' own.
+struct ObjectsConfig {
+  std::string volume;  ///< name of the zone in space in which objects are; empty: everywhere
+};
+
 /// Everything the user can say, with its defaults. Plain values: read it anywhere, once loaded it does
 /// not change. What each key does, its range and its unit stand in schema.cpp, one line a key.
 struct Configuration {
@@ -255,7 +264,9 @@ struct Configuration {
   std::vector<SignalConfig> signals;
   std::vector<InputConfig> inputs;
   RecordConfig record;
-  PipelineConfig pipeline;  ///< the stages' own Configs, see pipeline/pipeline_config.hpp
+  ObjectsConfig objects;
+  /// The stages' own Configs, see pipeline/pipeline_config.hpp; without zones and unit, which pipeline_of() adds.
+  PipelineConfig pipeline;
 };
 
 }  // namespace stereotrack::config

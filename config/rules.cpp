@@ -131,6 +131,12 @@ std::string pulse_fits_into_a_period(const Configuration& c) {
                      : "a pulse takes longer than there is time between two: shorten it, or lower camera.fps";
 }
 
+std::string sizes_leave_room(const Configuration& c) {
+  const ZoneRules::Config& sizes = c.pipeline.zones;
+  if (sizes.max_size_m == 0 || sizes.min_size_m <= sizes.max_size_m) return {};
+  return "min_size_m is above max_size_m, no object has such a size: give min_size_m <= max_size_m";
+}
+
 /// Set by the user, not by a preset or a default.
 bool said_by_user(const Loaded& loaded, std::string_view key) {
   const auto origin = loaded.origins.find(key);
@@ -167,6 +173,7 @@ std::span<const Rule> rules() {
       {"trigger_has_its_pwm", {"trigger.pwm_chip", "trigger.mode"}, trigger_has_its_pwm},
       {"trigger_line_is_nobody_elses", {"trigger.line"}, trigger_line_is_nobody_elses},
       {"pulse_fits_into_a_period", {"trigger.pulse_us", "trigger.late_us", "camera.fps"}, pulse_fits_into_a_period},
+      {"sizes_leave_room", {"objects.min_size_m", "objects.max_size_m"}, sizes_leave_room},
       {"split_stays_split", {"objects.merge_depth", "objects.split_depth"}, split_stays_split},
   };
   return all;

@@ -320,6 +320,13 @@ std::vector<Key> keys_of(Configuration& c) {
       key("objects.min_area_px", p.objects.min_area_px, 1, 1000000, "px", "Smaller objects are rejected."),
       key("objects.min_area_ppm", p.objects.min_area_ppm, 0, 100000, "1e-6 of the picture",
           "And objects smaller than this part of the picture: 100 is 31 px of 640x480."),
+      key("objects.min_size_m", p.zones.min_size_m, 0, kLargestSize_m, "m",
+          "Objects whose longer side is shorter are rejected, where their depth is known; 0: none is."),
+      key("objects.max_size_m", p.zones.max_size_m, 0, kLargestSize_m, "m",
+          "Objects whose longer side is longer are rejected, likewise; 0: none is."),
+      key("objects.volume", c.objects.volume, check_zone_or_none,
+          "Name of the [[zone]] in space outside of which nothing is tracked, where depth is known; empty: everything "
+          "everywhere is."),
       key("objects.merge_gap", p.objects.merge_gap, 0, 2, "size",
           "Gap across which pieces at one depth are one object, as a fraction of the larger one's longer side."),
       key("objects.merge_depth", p.objects.merge_depth, 0, 1, "disparity",

@@ -18,16 +18,13 @@ std::string check_name(std::string_view text) {
   return good ? std::string() : quoted(text) + " is no name: give 1 to 32 letters, digits, _ and -";
 }
 
-/// A signal may name no zone.
-std::string check_zone(std::string_view text) { return text.empty() ? std::string() : check_name(text); }
-
 std::vector<Key> keys_of_zone(ZoneConfig& zone) {
   const auto range = [](std::string_view name, std::array<double, 2>& member, const std::string& axis) {
     return key(name, member, -kFarthest_m, kFarthest_m, "m",
                axis + ", from and to, of a box in the left rectified camera's frame; [0, 0]: anywhere.");
   };
   return {
-      required(key("name", zone.name, check_name, "What signals call it.")),
+      required(key("name", zone.name, check_name, "What signals and objects.volume call it.")),
       range("x_m", zone.x_m, "Left to right"),
       range("y_m", zone.y_m, "Up (negative) to down"),
       range("z_m", zone.z_m, "Near to far"),
@@ -36,6 +33,14 @@ std::vector<Key> keys_of_zone(ZoneConfig& zone) {
       key("anchor", zone.anchor, {{"centre", ZoneAnchor::kCentre}, {"bottom", ZoneAnchor::kBottom}},
           "Which point of a target has to lie in that polygon: its centre, or the middle of its box's last row, where "
           "what stands on the ground touches it."),
+      key("targets", zone.targets,
+          {{"all", ZoneTargets::kAll}, {"none_begin", ZoneTargets::kNoneBegin}, {"ignore", ZoneTargets::kIgnore}},
+          "What is tracked there: all; only targets that began elsewhere; or nothing: the pixels of a polygon are "
+          "never "
+          "foreground, and what is in a box is rejected."),
+      key("min_size_m", zone.min_size_m, 0, kLargestSize_m, "m",
+          "There in place of objects.min_size_m, if not 0; of several zones, the first that has one."),
+      key("max_size_m", zone.max_size_m, 0, kLargestSize_m, "m", "Likewise, of objects.max_size_m."),
   };
 }
 
@@ -53,7 +58,7 @@ std::vector<Key> keys_of_signal(SignalConfig& signal) {
            {"deadline_missed", SignalWhen::kDeadlineMissed}},
           "What it tells: there is a target, one in the zone, one nearer than limit_m, one that arrives in less than "
           "limit_s; all is well (the line toggles); an output leaves without a result of its own."),
-      key("zone", signal.zone, check_zone, "Only targets in this zone count; empty: all do."),
+      key("zone", signal.zone, check_zone_or_none, "Only targets in this zone count; empty: all do."),
       key("limit_m", signal.limit_m, 0, kFarthest_m, "m", "Distance from the left camera, for distance_below."),
       key("limit_s", signal.limit_s, 0, 3600, "s",
           "Distance over closing speed along the line of sight, for time_to_reach_below."),
@@ -94,7 +99,7 @@ struct Wrong {
   std::string what;
 };
 
-Wrong wrong_of(const ZoneConfig& zone) {
+Wrong wrong_of(const ZoneConfig& zone, const ZoneRules::Config& everywhere) {
   const auto given = [](const std::array<double, 2>& range) { return range[0] != 0 || range[1] != 0; };
   const bool in_space = given(zone.x_m) || given(zone.y_m) || given(zone.z_m);
   if (in_space && !zone.picture.empty()) {
@@ -110,6 +115,41 @@ Wrong wrong_of(const ZoneConfig& zone) {
   for (const auto& [name, range] : {std::pair{"x_m", zone.x_m}, {"y_m", zone.y_m}, {"z_m", zone.z_m}}) {
     if (falls(range)) return {name, "it ends before it begins: give [FROM, TO]"};
   }
+  const std::string_view sized = zone.min_size_m > 0 ? "min_size_m" : zone.max_size_m > 0 ? "max_size_m" : "";
+  if (sized.empty()) return {};
+  if (zone.targets == ZoneTargets::kIgnore) return {sized, "nothing is tracked in an ignored zone: leave the size out"};
+  const double least_m = zone.min_size_m > 0 ? zone.min_size_m : everywhere.min_size_m;
+  const double most_m = zone.max_size_m > 0 ? zone.max_size_m : everywhere.max_size_m;
+  if (most_m > 0 && least_m > most_m) {
+    return {sized, "no size is left between the zone's limits and those of [objects]: give min_size_m <= max_size_m"};
+  }
+  return {};
+}
+
+std::string names_of(const std::vector<ZoneConfig>& zones) {
+  std::string names;
+  for (const ZoneConfig& zone : zones) names += (names.empty() ? "" : ", ") + quoted(zone.name);
+  return names;
+}
+
+std::string no_such_zone(const std::string& name, const std::vector<ZoneConfig>& zones) {
+  const std::string names = names_of(zones);
+  return "there is no zone " + quoted(name) + ": " +
+         (names.empty() ? "write a [[zone]] of this name" : "there are " + names);
+}
+
+/// Empty: nothing is.
+std::string wrong_of_volume(const Configuration& c) {
+  const std::string& volume = c.objects.volume;
+  if (volume.empty()) return {};
+  const auto zone = std::find_if(c.zones.begin(), c.zones.end(), [&](const auto& each) { return each.name == volume; });
+  if (zone == c.zones.end()) return no_such_zone(volume, c.zones);
+  if (!zone->picture.empty()) {
+    return "zone " + quoted(volume) + " is a polygon in the picture: name one with x_m, y_m or z_m";
+  }
+  if (zone->targets == ZoneTargets::kIgnore) {
+    return "zone " + quoted(volume) + " is ignored, nothing would be tracked: name another, or leave its targets out";
+  }
   return {};
 }
 
@@ -121,12 +161,7 @@ Wrong wrong_of(const SignalConfig& signal, const std::vector<ZoneConfig>& zones)
   }
   const bool known =
       std::any_of(zones.begin(), zones.end(), [&](const auto& zone) { return zone.name == signal.zone; });
-  if (!signal.zone.empty() && !known) {
-    std::string names;
-    for (const ZoneConfig& zone : zones) names += (names.empty() ? "" : ", ") + quoted(zone.name);
-    return {"zone", "there is no zone " + quoted(signal.zone) + ": " +
-                        (names.empty() ? "write a [[zone]] of this name" : "there are " + names)};
-  }
+  if (!signal.zone.empty() && !known) return {"zone", no_such_zone(signal.zone, zones)};
   if (signal.when == SignalWhen::kDistanceBelow && !(signal.limit_m > 0)) {
     return {"limit_m", "distance_below needs it: give a distance above 0"};
   }
@@ -176,6 +211,8 @@ std::string check_line(std::string_view text) {
          " is no GPIO line: write CHIP:LINE, for example \"gpiochip0:17\", \"pinctrl-bcm2711:GPIO17\" or \"sim:near\"";
 }
 
+std::string check_zone_or_none(std::string_view text) { return text.empty() ? std::string() : check_name(text); }
+
 Key active_key(std::string_view name, ActiveLevel& member, std::string_view doc) {
   return key(name, member, {{"high", ActiveLevel::kHigh}, {"low", ActiveLevel::kLow}}, doc);
 }
@@ -195,7 +232,8 @@ Key zones_key(std::vector<ZoneConfig>& zones) {
   gate.x_m = {-1, 1};
   gate.y_m = {-2, 2};
   gate.z_m = {0.5, 5};
-  return tables("zone", zones, kMaxZones, keys_of_zone, gate, "Where a target may be, for signals.");
+  return tables("zone", zones, kMaxZones, keys_of_zone, gate,
+                "A place, for signals (docs/SIGNALS.md) and for rules about what is tracked there (docs/TRACKING.md).");
 }
 
 Key signals_key(std::vector<SignalConfig>& signals) {
@@ -222,11 +260,16 @@ Key inputs_key(std::vector<InputConfig>& inputs) {
 
 void check_signals(const Loaded& loaded) {
   const Configuration& c = loaded.configuration;
-  for (std::size_t i = 0; i < c.zones.size(); ++i) refuse_if(loaded, table_name("zone", i), wrong_of(c.zones[i]));
+  for (std::size_t i = 0; i < c.zones.size(); ++i) {
+    refuse_if(loaded, table_name("zone", i), wrong_of(c.zones[i], c.pipeline.zones));
+  }
   for (std::size_t i = 0; i < c.signals.size(); ++i) {
     refuse_if(loaded, table_name("signal", i), wrong_of(c.signals[i], c.zones));
   }
   check_unique(loaded, "zone", c.zones, &ZoneConfig::name, "name", "give each zone its own name");
+  if (const std::string wrong = wrong_of_volume(c); !wrong.empty()) {
+    throw error_at(loaded.origins, "objects.volume", wrong);
+  }
   check_unique(loaded, "signal", c.signals, &SignalConfig::name, "name", "give each signal its own name");
   check_unique(loaded, "signal", c.signals, &SignalConfig::line, "line", "a line has one rule");
   check_unique(loaded, "input", c.inputs, &InputConfig::name, "name", "give each input its own name");

@@ -23,6 +23,12 @@ inline constexpr std::size_t kMaxCorners = 16;  ///< of a zone in the picture
 [[nodiscard]] Key active_key(std::string_view name, ActiveLevel& member, std::string_view doc);
 [[nodiscard]] Key bias_key(std::string_view name, InputBias& member, std::string_view doc);
 
+/// Largest size of an object that may be asked for.
+inline constexpr double kLargestSize_m = 1000;
+
+/// Why this is no zone's name; empty: it is, or there is none.
+[[nodiscard]] std::string check_zone_or_none(std::string_view text);
+
 /// [[zone]], [[signal]] and [[input]], for the table in schema.cpp.
 [[nodiscard]] Key zones_key(std::vector<ZoneConfig>& zones);
 [[nodiscard]] Key signals_key(std::vector<SignalConfig>& signals);
@@ -30,7 +36,8 @@ inline constexpr std::size_t kMaxCorners = 16;  ///< of a zone in the picture
 
 /// Throws Error for the first zone, signal or input that contradicts itself or another, at the key that says so: names
 /// and lines given twice, a line that is both driven and read, a zone that is neither in space nor in the picture, a
-/// zone that there is not, a condition without its limit, a pulse without width. Part of load().
+/// zone that there is not, a condition without its limit, a pulse without width, a rule of a zone that leaves nothing
+/// to track, a working volume that is no box. Part of load().
 void check_signals(const Loaded& loaded);
 
 }  // namespace stereotrack::config

@@ -10,7 +10,7 @@ namespace stereotrack {
 
 /// What the pipeline's memory is for: rooms of the stages, in the order of the stages.
 enum class MemoryPart : std::uint8_t {
-  kPlanes,      ///< luma, chroma, smoothed planes, distance and mask of both views; lines of a mosaic
+  kPlanes,      ///< luma, chroma, smoothed planes, distance and mask of both views; lines of a mosaic; what is ignored
   kBackground,  ///< background models of both views
   kForeground,  ///< edges or hysteresis, closing
   kShapes,      ///< filling, opening, runs, blobs

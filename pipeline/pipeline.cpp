@@ -8,6 +8,7 @@
 #include "pipeline/motion/difference.hpp"
 #include "pipeline/motion/ghost_test.hpp"
 #include "pipeline/photometry/smooth.hpp"
+#include "pipeline/shape/bits_kernel.hpp"
 #include "pipeline/shape/region.hpp"
 #include "pipeline/shape/threshold.hpp"
 
@@ -88,6 +89,10 @@ Result<Pipeline> Pipeline::create(const PipelineConfig& config, const Setup& set
   if (setup.calibration != nullptr) planes(self.right_, false);
   Result<void> outcome;
   if (!keep(self.ingest_, Ingest::create(setup.width, arena), outcome)) return fail(outcome.error());
+  if (config.zones.any() &&
+      !keep(self.zone_rules_, ZoneRules::create(config.zones, setup.width, setup.height, arena), outcome)) {
+    return fail(outcome.error());
+  }
   self.memory_.charge(MemoryPart::kPlanes, arena);
   self.equalise_left_ = Equalise({config.equalise});
   self.equalise_right_ = Equalise({config.equalise});
@@ -134,7 +139,7 @@ Result<void> Pipeline::create_foreground(Arena& arena) noexcept {
       return outcome;
     }
     memory_.charge(MemoryPart::kBackground, arena);
-    if (!keep(foreground_left_, ForegroundMask::create(config_.foreground, width, height, arena), outcome) ||
+    if (!keep(foreground_left_, ForegroundMask::create(config_.foreground, width, height, arena, ignored()), outcome) ||
         !keep(closing_, Closing::create({.repeats = shape.closing}, width, height, arena), outcome)) {
       return outcome;
     }
@@ -270,6 +275,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
                                 .strength = left_.distance,
                                 .predictions = predictions_,
                                 .rectifier = both ? rectifier() : nullptr,
+                                .rules = zone_rules_ ? &*zone_rules_ : nullptr,
                                 .observer = setup_.decisions};
   for (Detector::Candidate& candidate : detector_->segment(objects)) match_whole(candidate, objects);
   const std::span<const Detection> detections = detector_->conclude(objects);
@@ -293,6 +299,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
   result.labels = blobs_.labels;
   result.detections = detections;
   for (std::size_t i = 0; i < kRejections; ++i) result.rejections[i] = rejections_[i] + detector_->rejections()[i];
+  result.rejections[static_cast<std::size_t>(Rejection::kNoneBegin)] += tracker_->held_back();
   result.hulls_reduced = detector_->hulls_reduced() + (convex_hull_ ? convex_hull_->reduced() : 0);
   return result;
 }
@@ -338,6 +345,12 @@ void Pipeline::find_foreground() noexcept {
   rejections_[static_cast<std::size_t>(Rejection::kSmall)] += static_cast<std::uint32_t>(blobs_.small);
 }
 
+// Closing, filling and the level set grow over what is ignored.
+void Pipeline::clear_ignored(ImageView<std::uint8_t> picture) const noexcept {
+  const BitMask mask = ignored();
+  for (int y = 0; y < mask.height; ++y) clear_where_bits(mask.row(y), mask.width, picture.row(y));
+}
+
 // What found no room is counted, whichever part of the frame it was lost in.
 void Pipeline::count_no_room(int dropped) noexcept {
   rejections_[static_cast<std::size_t>(Rejection::kNoRoom)] += static_cast<std::uint32_t>(dropped);
@@ -355,10 +368,12 @@ void Pipeline::foreground_from_edges() noexcept {
     mean_cr_->learn(left_.cr);
   }
   difference(mean_y_->mean(), left_.y, left_.distance);
+  clear_ignored(left_.distance);  // before edges are found: the contour of what it cuts stays closed
   (void)sobel_->run(left_.distance, scratch_);
   (void)threshold(scratch_, config_.shape.edge_threshold, scratch_);
   (void)contour_fill_->run(scratch_, scratch_);
   (void)opening_->run(scratch_, left_.mask);
+  clear_ignored(left_.mask);
 }
 
 void Pipeline::foreground_from_model() noexcept {
@@ -369,6 +384,7 @@ void Pipeline::foreground_from_model() noexcept {
   if (light_change_) fill(moving_, 0);
   (void)closing_->run(moving_, scratch_);
   (void)contour_fill_->run(scratch_, left_.mask);
+  clear_ignored(left_.mask);
   if (!sees_both_) return;
   background_right_->distance({right_.smooth_y, {}, {}}, right_.distance);
   (void)foreground_right_->run(right_.distance, right_.mask);
@@ -568,6 +584,7 @@ void Pipeline::remove_shadows() noexcept {
   }
   (void)opening_->run(left_.mask, scratch_);
   if (background_left_) (void)contour_fill_->run(scratch_, scratch_);
+  clear_ignored(scratch_);
   find_blobs(scratch_);
   if (background_left_ && config_.shadow.method == ShadowMethod::kStereo) reject_background();
 }

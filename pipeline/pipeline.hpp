@@ -27,6 +27,7 @@
 #include "pipeline/stereo/region_matcher.hpp"
 #include "pipeline/track/pair_check.hpp"
 #include "pipeline/track/track_report.hpp"
+#include "pipeline/track/zone_rules.hpp"
 
 namespace stereotrack {
 
@@ -137,6 +138,8 @@ class Pipeline {
   }
 
   void ingest(const FramePair& pair) noexcept;
+  [[nodiscard]] BitMask ignored() const noexcept { return zone_rules_ ? zone_rules_->ignored() : BitMask{}; }
+  void clear_ignored(ImageView<std::uint8_t> picture) const noexcept;
   void find_foreground() noexcept;
   void count_no_room(int dropped) noexcept;
   void find_blobs(ImageView<const std::uint8_t> mask) noexcept;
@@ -190,6 +193,7 @@ class Pipeline {
   CanvasPair background_canvases_;  ///< the backgrounds' luma
   LazyCanvas right_moving_;         ///< right canvas: foreground of the right view
 
+  std::optional<ZoneRules> zone_rules_;  ///< where there are any
   std::optional<Ingest> ingest_;
   Equalise equalise_left_{{}};
   Equalise equalise_right_{{}};

@@ -11,6 +11,7 @@
 #include "pipeline/track/detector.hpp"
 #include "pipeline/track/features.hpp"
 #include "pipeline/track/tracker.hpp"
+#include "pipeline/track/zone_rules.hpp"
 
 namespace stereotrack {
 
@@ -72,6 +73,7 @@ struct PipelineConfig {
   DisparityConfig disparity;
   ShadowConfig shadow;
   Detector::Config objects;
+  ZoneRules::Config zones;
   Features::Config features;
   Tracker::Config track;
 };

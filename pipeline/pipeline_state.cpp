@@ -32,7 +32,8 @@ std::uint64_t Pipeline::fingerprint() const noexcept {
                                           number(config_.background.frames),
                                           number(full_range_),
                                           number(state_bytes())};
-  return checksum(std::as_bytes(std::span(form)));
+  // Without rules the sum is that of a version that knew none.
+  return checksum(std::as_bytes(std::span(form))) ^ (zone_rules_ ? zone_rules_->fingerprint() : 0);
 }
 
 std::size_t Pipeline::state_bytes() const noexcept {

@@ -93,7 +93,8 @@ bool is_target(const TrackReport& track) { return track.state != TrackState::kTe
 
 }  // namespace
 
-Painter::Painter(int width, int height, const RectifiedGeometry* geometry, LengthUnit unit)
+Painter::Painter(int width, int height, const RectifiedGeometry* geometry, LengthUnit unit,
+                 std::vector<ShownZone> zones)
     : scale_(picture_scale(width, height)), unit_(std::move(unit)) {
   const cv::Size picture(std::max(1, static_cast<int>(std::lround(width * scale_))),
                          std::max(1, static_cast<int>(std::lround(height * scale_))));
@@ -104,13 +105,26 @@ Painter::Painter(int width, int height, const RectifiedGeometry* geometry, Lengt
   canvas_.create(even(kHeader_px + body + 1), even(panel_x + panel + 1), CV_8UC3);
   picture_area_ = {(column - picture.width) / 2, kHeader_px + (body - picture.height) / 2, picture.width,
                    picture.height};
+  for (const ShownZone& zone : zones) {
+    DrawnZone drawn{zone, zone.floor, {}};
+    if (zone.zone.kind == Zone::Kind::kPicture) {
+      drawn.outline.emplace_back();
+      for (const Zone::Corner& corner : zone.zone.corners) drawn.outline.back().emplace_back(corner.x, corner.y);
+      drawn.outline.back().push_back(drawn.outline.back().front());
+      if (zone.use == ShownZone::Use::kIgnored) drawn.ignored = mask_of(zone.zone, picture, scale_);
+    }
+    for (Polyline& line : drawn.outline) {
+      for (cv::Point2d& p : line) p = {(p.x + 0.5) * scale_ - 0.5, (p.y + 0.5) * scale_ - 0.5};
+    }
+    zones_.push_back(std::move(drawn));
+  }
   const cv::Rect side(panel_x, kHeader_px, panel, body);
   if (geometry == nullptr) {
     mask_area_ = fit({width, height}, side);
     mask_area_.y = side.y;
     return;
   }
-  top_view_.emplace(*geometry, unit_);
+  top_view_.emplace(*geometry, unit_, std::move(zones));
   view_area_ = side;
   if (body < 640) return;
   view_area_.height = body - 200 - kGap_px;
@@ -181,6 +195,7 @@ void Painter::draw_header(const FrameResult& result) {
 void Painter::draw_picture(const Picture& raw, const FrameResult& result) {
   cv::Mat picture = canvas_(picture_area_);
   if (!raw.empty()) resized(to_bgr(raw), picture_area_.size()).copyTo(picture);
+  draw_zones(picture);
   const auto drawn = [&](double x, double y) {
     return cv::Point2d((x + 0.5) * scale_ - 0.5, (y + 0.5) * scale_ - 0.5);
   };
@@ -219,6 +234,30 @@ void Painter::draw_picture(const Picture& raw, const FrameResult& result) {
     }
     const Polyline box = corners(track.box, scale_);
     labels.draw(text, cv::Rect(cv::Point(box[0]), cv::Point(box[2])), kText, pen_of(track).colour);
+  }
+}
+
+void Painter::draw_zones(cv::Mat& picture) const {
+  for (const DrawnZone& drawn : zones_) {
+    const Pen pen = pen_of(drawn.zone);
+    if (!drawn.ignored.empty()) hatch(picture, drawn.ignored, pen.colour);
+    for (const Polyline& line : drawn.outline) draw_outlined_line(picture, line, false, pen);
+  }
+  const cv::Rect2d whole(0, 0, picture.cols, picture.rows);
+  for (const DrawnZone& drawn : zones_) {
+    // At its highest corner that is seen, within.
+    cv::Point2d at(-1, picture.rows);
+    for (const Polyline& line : drawn.outline) {
+      for (const cv::Point2d& p : line) {
+        if (p.y < at.y && whole.contains(p)) at = p;
+      }
+    }
+    const std::string text = text_of(drawn.zone);
+    const int last = picture.cols - text_size(text, kSmall).width - 4;
+    if (at.x < 0) continue;
+    draw_text(picture, text,
+              {std::clamp(static_cast<int>(at.x) + 6, 4, std::max(last, 4)), static_cast<int>(at.y) + 16}, kSmall,
+              pen_of(drawn.zone).colour);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <stdexcept>
+#include <utility>
 
 #include "firmware-app/render/output.hpp"
 #include "firmware-app/render/painter.hpp"
@@ -19,8 +20,8 @@ double rate_hz(const capture::SourceInfo& info) {
 class PainterToOutput final : public Renderer {
  public:
   PainterToOutput(const std::string& target, const capture::SourceInfo& info, const RectifiedGeometry* geometry,
-                  const LengthUnit& unit)
-      : painter_(info.width, info.height, geometry, unit),
+                  const LengthUnit& unit, std::vector<ShownZone> zones)
+      : painter_(info.width, info.height, geometry, unit, std::move(zones)),
         output_(names_video(target) ? make_video_output(target, painter_.size(), rate_hz(info))
                                     : make_folder_output(target)) {}
 
@@ -37,10 +38,16 @@ class PainterToOutput final : public Renderer {
 }  // namespace
 
 std::unique_ptr<Renderer> make_renderer(const std::string& target, const capture::SourceInfo& info,
-                                        const Rectifier* rectifier, double unit_m) {
+                                        const Rectifier* rectifier, double unit_m, std::vector<ShownZone> zones) {
   if (info.width <= 0 || info.height <= 0) throw std::runtime_error(info.name + ": size of its pictures is not known");
   const LengthUnit unit = unit_m > 0 ? LengthUnit{unit_m, "m"} : LengthUnit{};
-  return std::make_unique<PainterToOutput>(target, info, rectifier != nullptr ? &rectifier->geometry() : nullptr, unit);
+  if (rectifier != nullptr) {
+    for (ShownZone& shown : zones) {
+      if (shown.zone.kind == Zone::Kind::kSpace) shown.floor = floor_of(shown.zone, *rectifier, unit_m);
+    }
+  }
+  return std::make_unique<PainterToOutput>(target, info, rectifier != nullptr ? &rectifier->geometry() : nullptr, unit,
+                                           std::move(zones));
 }
 
 }  // namespace stereotrack::render

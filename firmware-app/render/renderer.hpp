@@ -2,9 +2,11 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "drivers/capture/frame_source.hpp"
 #include "firmware-app/render/annotation.hpp"
+#include "firmware-app/render/zones.hpp"
 #include "pipeline/pipeline.hpp"
 
 namespace stereotrack::render {
@@ -27,9 +29,10 @@ class Renderer {
 };
 
 /// target: FILE.mp4 (or .avi, .mkv): a video; any other name: a folder that receives %06d.png.
-/// rectifier: null for mono. unit_m: metres in one unit of the calibration, 0 = not known.
+/// rectifier: null for mono. zones: drawn, too. unit_m: metres in one unit of the calibration, 0 = not known.
 /// Throws std::runtime_error with one line naming the target and the way out.
 [[nodiscard]] std::unique_ptr<Renderer> make_renderer(const std::string& target, const capture::SourceInfo& info,
-                                                      const Rectifier* rectifier, double unit_m);
+                                                      const Rectifier* rectifier, double unit_m,
+                                                      std::vector<ShownZone> zones = {});
 
 }  // namespace stereotrack::render

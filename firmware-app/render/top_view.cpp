@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -61,7 +62,10 @@ Polyline ellipse(const TrackReport& track) {
 
 }  // namespace
 
-TopView::TopView(const RectifiedGeometry& geometry, LengthUnit unit) : geometry_(geometry), unit_(std::move(unit)) {
+TopView::TopView(const RectifiedGeometry& geometry, LengthUnit unit, std::vector<ShownZone> zones)
+    : geometry_(geometry), unit_(std::move(unit)) {
+  std::copy_if(zones.begin(), zones.end(), std::back_inserter(zones_),
+               [](const ShownZone& zone) { return zone.zone.kind == Zone::Kind::kSpace; });
   const double near_px = geometry_.width_left / 10.0;
   reach_ = round_reach(geometry_.f * geometry_.baseline / near_px * unit_.per_unit);
 }
@@ -137,6 +141,28 @@ void TopView::draw_scene(cv::Mat& picture) const {
   draw_dot(picture, camera, 4, kBright);
 }
 
+// Clipped to a little more than the view: a side that is anywhere lies far away.
+void TopView::draw_zones(cv::Mat& picture) const {
+  const cv::Size size = picture.size();
+  const auto corner = [&](double x_m, double z_m) {
+    const cv::Point2d at = place(size, x_m / unit_.per_unit, z_m / unit_.per_unit);
+    return cv::Point2d(std::clamp(at.x, -20.0, size.width + 20.0), std::clamp(at.y, -20.0, size.height + 20.0));
+  };
+  for (const ShownZone& shown : zones_) {
+    const Zone& box = shown.zone;
+    const cv::Point2d low = corner(box.x_m.from, box.z_m.to);
+    const cv::Point2d high = corner(box.x_m.to, box.z_m.from);
+    const Polyline outline{low, {high.x, low.y}, high, {low.x, high.y}};
+    const Pen pen = pen_of(shown);
+    if (shown.use == ShownZone::Use::kIgnored) fill(picture, outline, pen.colour, 0.18);
+    draw_line(picture, outline, true, pen);
+    const cv::Point at(static_cast<int>(std::max(low.x, 40.0)) + 4, static_cast<int>(std::max(low.y, 24.0)) + 14);
+    if (at.x < high.x && at.y < high.y && at.x < size.width && at.y < size.height) {
+      draw_text(picture, text_of(shown), at, kSmall, pen.colour);
+    }
+  }
+}
+
 void TopView::draw_track(cv::Mat& picture, const TrackReport& track, const Trails& trails) const {
   const cv::Size size = picture.size();
   const Pen pen = pen_of(track);
@@ -170,6 +196,7 @@ void TopView::draw(cv::Mat& picture, const FrameResult& result, const Trails& tr
   make_room(result, picture.size());
   picture.setTo(kBackground);
   draw_scene(picture);
+  draw_zones(picture);
   for (const TrackReport& track : result.tracks) {
     if (usable(track)) draw_track(picture, track, trails);
   }

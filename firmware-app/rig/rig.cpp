@@ -7,6 +7,7 @@
 
 #include "config/calibration/check.hpp"
 #include "config/rules.hpp"
+#include "config/zones.hpp"
 #include "drivers/capture/synthetic/synthetic_source.hpp"
 
 namespace stereotrack {
@@ -84,8 +85,8 @@ Pipeline make_pipeline(const PipelineConfig& config, const StereoCalibration* ca
 
 Pipeline make_pipeline(const Rig& rig, const capture::SourceInfo& info, Arena& arena, const StageObserver& observer,
                        const DecisionObserver& decisions) {
-  return make_pipeline(rig.configuration().pipeline, info.stereo ? &*rig.calibration : nullptr, info, arena, observer,
-                       decisions);
+  return make_pipeline(config::pipeline_of(rig.configuration(), rig.unit_m), info.stereo ? &*rig.calibration : nullptr,
+                       info, arena, observer, decisions);
 }
 
 void print_memory(std::ostream& out, const MemoryUse& memory) {

@@ -7,19 +7,12 @@
 #include "config/error.hpp"
 #include "config/milliseconds.hpp"
 #include "config/signals.hpp"
+#include "config/zones.hpp"
 
 namespace stereotrack::signals {
 namespace {
 
-static_assert(config::kMaxSignals == kMaxSignals && config::kMaxZones == kMaxZones &&
-              config::kMaxCorners == Zone::kMaxCorners);
-
-constexpr double kAnywhere_m = 1e6;
-
-[[nodiscard]] Zone::Range range_of(const std::array<double, 2>& said) {
-  const bool anywhere = said[0] == 0 && said[1] == 0;
-  return anywhere ? Zone::Range{-kAnywhere_m, kAnywhere_m} : Zone::Range{said[0], said[1]};
-}
+static_assert(config::kMaxSignals == kMaxSignals && config::kMaxZones == kMaxZones);
 
 [[nodiscard]] Condition condition_of(config::SignalWhen when) {
   switch (when) {
@@ -31,17 +24,6 @@ constexpr double kAnywhere_m = 1e6;
     case config::SignalWhen::kDeadlineMissed: return Condition::kDeadlineMissed;
   }
   return Condition::kConfirmed;
-}
-
-[[nodiscard]] Zone zone_of(const config::ZoneConfig& said) {
-  Zone zone;
-  zone.kind = said.picture.empty() ? Zone::Kind::kSpace : Zone::Kind::kPicture;
-  zone.x_m = range_of(said.x_m);
-  zone.y_m = range_of(said.y_m);
-  zone.z_m = range_of(said.z_m);
-  for (const auto& [x, y] : said.picture) (void)zone.corners.push({x, y});
-  zone.anchor = said.anchor == config::ZoneAnchor::kBottom ? Zone::Anchor::kBottom : Zone::Anchor::kCentre;
-  return zone;
 }
 
 [[nodiscard]] Signal signal_of(const config::SignalConfig& said, const std::vector<config::ZoneConfig>& zones) {
@@ -83,7 +65,7 @@ SignalRules make_rules(const config::Configuration& configuration, double unit_m
   SignalRules::Config config;
   config.unit_m = unit_m;
   config.stale_after = stale_after;
-  for (const config::ZoneConfig& said : configuration.zones) (void)config.zones.push(zone_of(said));
+  for (const config::ZoneConfig& said : configuration.zones) (void)config.zones.push(config::zone_of(said));
   for (const config::SignalConfig& said : configuration.signals) {
     (void)config.signals.push(signal_of(said, configuration.zones));
   }

@@ -44,7 +44,7 @@ Result<SignalRules> SignalRules::create(const Config& config) noexcept {
   if (!std::isfinite(config.unit_m)) return fail(Fault::kNotFinite);
   if (config.unit_m < 0 || config.stale_after.count() <= 0) return fail(Fault::kBadConfig);
   for (const Zone& zone : config.zones) {
-    if (const auto good = signals::check(zone); !good.has_value()) return fail(good.error());
+    if (const auto good = stereotrack::check(zone); !good.has_value()) return fail(good.error());
   }
   for (const Signal& signal : config.signals) {
     if (const auto good = check(signal, config); !good.has_value()) return fail(good.error());

@@ -8,11 +8,11 @@
 #include <span>
 
 #include "drivers/gpio/line.hpp"
-#include "firmware-app/signals/zone.hpp"
 #include "pipeline/core/bounded_vector.hpp"
 #include "pipeline/core/result.hpp"
 #include "pipeline/core/time.hpp"
 #include "pipeline/track/track_report.hpp"
+#include "pipeline/track/zone.hpp"
 
 namespace stereotrack::signals {
 

@@ -54,6 +54,11 @@ const char* reason(Rejection why) {
     case Rejection::kShadow: return "shadow: the shadow test left too little of it";
     case Rejection::kOwnSurface: return "background's own surface: light, a mark, or the place of what has left";
     case Rejection::kNoRoom: return "no room: more candidates than the detector holds";
+    case Rejection::kOutside: return "outside of objects.volume";
+    case Rejection::kIgnored: return "in a zone whose targets are ignored";
+    case Rejection::kUnderSize: return "under min_size_m of [objects] or of its zone";
+    case Rejection::kOverSize: return "over max_size_m of [objects] or of its zone";
+    case Rejection::kNoneBegin: return "no target begins in its zone, or in a wrong pair";  // of a detection: told as its fate
   }
   return "";
 }
@@ -150,6 +155,9 @@ std::string Explanation::fate(std::uint16_t detection) const {
     if (decision.detection != detection) continue;
     if (decision.kind == Decision::Kind::kTook) return format("taken by #%u", decision.id);
     if (decision.kind == Decision::Kind::kBorn) return format("new: #%u", decision.id);
+    if (decision.kind == Decision::Kind::kNoneBegin) {
+      return wrong_pair_ ? "no target's: none begins in a wrong pair" : "no target's: none begins in its zone";
+    }
     if (decision.kind == Decision::Kind::kNoRoom) return format("lost: %d targets are there", Tracker::kMaxTracks);
   }
   return "no target's";
@@ -217,6 +225,7 @@ void Explanation::explain_rejected() {
     if (request_.id != 0 && intersect(near, candidate.box).empty()) continue;
     std::string line = format("  rejected %s, %d px", text_of(candidate.box).c_str(), candidate.area);
     if (candidate.has_depth) line += format(", disparity %.2f px", candidate.disparity);
+    if (candidate.size_m > 0) line += format(", %.2f m long", candidate.size_m);
     say(line + ": " + reason(candidate.why));
     annotation_.marks.push_back({candidate.box, to_string(candidate.why), render::Annotation::Kind::kRejected});
   }
@@ -248,6 +257,7 @@ std::string Explanation::sentence(const Decision& decision) const {
       return line;
     }
     case Decision::Kind::kNoRoom: return format("detection %u found no room", decision.detection);
+    case Decision::Kind::kNoneBegin: break;  // of no target
     case Decision::Kind::kConfirmed:
       return format("confirmed: %d detections, evidence %.2f, way %.1f of %.1f px", decision.hits, decision.evidence,
                     decision.way_px, decision.path_px);

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "config/schema.hpp"
+#include "config/zones.hpp"
 #include "drivers/record/output_note.hpp"
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/encoder.hpp"
@@ -102,6 +103,23 @@ std::unique_ptr<Explanation> make_explanation(const std::optional<ExplainRequest
   return std::make_unique<Explanation>(*request, rig.configuration().pipeline, rig.unit_m);
 }
 
+render::ShownZone::Use use_of(const config::ZoneConfig& zone, const std::string& volume) {
+  switch (zone.targets) {
+    case config::ZoneTargets::kAll: break;
+    case config::ZoneTargets::kNoneBegin: return render::ShownZone::Use::kNoneBegin;
+    case config::ZoneTargets::kIgnore: return render::ShownZone::Use::kIgnored;
+  }
+  return zone.name == volume ? render::ShownZone::Use::kVolume : render::ShownZone::Use::kSignals;
+}
+
+std::vector<render::ShownZone> shown_zones(const config::Configuration& configuration) {
+  std::vector<render::ShownZone> shown;
+  for (const config::ZoneConfig& zone : configuration.zones) {
+    shown.push_back({zone.name, config::zone_of(zone), use_of(zone, configuration.objects.volume), {}});
+  }
+  return shown;
+}
+
 // Everything that one replay carries from frame to frame.
 class Replay {
  public:
@@ -129,7 +147,8 @@ class Replay {
           telemetry::UdpSender::Config{.multicast_hops = rig_.configuration().telemetry.multicast_ttl});
     }
     if (arguments.render) {
-      renderer_ = render::make_renderer(*arguments.render, rig_.source->info(), pipeline_.rectifier(), rig_.unit_m);
+      renderer_ = render::make_renderer(*arguments.render, rig_.source->info(), pipeline_.rectifier(), rig_.unit_m,
+                                        shown_zones(rig_.configuration()));
     }
     summary_.source = arguments.rig.source;
     summary_.memory_bytes = arena_.bytes_used();

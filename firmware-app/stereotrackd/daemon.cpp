@@ -11,6 +11,7 @@
 #include "config/error.hpp"
 #include "config/milliseconds.hpp"
 #include "config/schema.hpp"
+#include "config/zones.hpp"
 #include "firmware-app/rig/rig.hpp"
 #include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/stereotrackd/log.hpp"
@@ -136,8 +137,8 @@ Daemon::Daemon(Parts parts)
                                                           .also = parts.also},
                                         *effort, pool_, *mailbox_, bell_, *source_, *vitals_);
   frames_->tell(&target_notes_);
-  pipeline_ = std::make_unique<Pipeline>(
-      make_pipeline(configuration.pipeline, parts.calibration, info, arena_, frames_->observer()));
+  pipeline_ = std::make_unique<Pipeline>(make_pipeline(config::pipeline_of(configuration, parts.unit_m),
+                                                       parts.calibration, info, arena_, frames_->observer()));
   arena_.seal();
   if (configuration.record.on) {
     record::BlackBox::Run run;

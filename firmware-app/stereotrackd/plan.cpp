@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <string_view>
+#include <utility>
 
 #include "config/schema.hpp"
+#include "config/zones.hpp"
 #include "drivers/telemetry/udp_sender.hpp"
 #include "firmware-app/signals/set_up.hpp"
 
@@ -14,6 +17,57 @@ namespace {
 
 /// Keys, beside zones and signals, that can change while the daemon runs.
 constexpr std::array<std::string_view, 2> kDestinations{"telemetry.destinations", "telemetry.multicast_ttl"};
+
+using Zones = std::vector<config::ZoneConfig>;
+
+const config::ZoneConfig* find(const Zones& zones, const std::string& name) {
+  const auto found = std::find_if(zones.begin(), zones.end(), [&](const auto& zone) { return zone.name == name; });
+  return found == zones.end() ? nullptr : &*found;
+}
+
+/// Those that a pipeline with this working volume uses, in their order, which counts.
+Zones of_pipeline(const Zones& zones, const std::string& volume) {
+  Zones used;
+  std::copy_if(zones.begin(), zones.end(), std::back_inserter(used),
+               [&](const auto& zone) { return config::is_for_pipeline(zone, volume); });
+  return used;
+}
+
+/// What the daemon has after a reload: the pipeline's zones as they are, then the others as they are wanted.
+Zones zones_after(const config::Configuration& running, const config::Configuration& wanted) {
+  const std::string& volume = running.objects.volume;
+  Zones next = of_pipeline(running.zones, volume);
+  if (next == of_pipeline(wanted.zones, volume)) return wanted.zones;
+  const std::size_t fixed = next.size();
+  for (config::ZoneConfig zone : wanted.zones) {
+    const bool stays = std::any_of(next.begin(), next.begin() + static_cast<std::ptrdiff_t>(fixed),
+                                   [&](const auto& used) { return used.name == zone.name; });
+    if (stays) continue;
+    // The pipeline does not know it until the restart, and the next reload has to say so again.
+    zone.targets = config::ZoneTargets::kAll;
+    zone.min_size_m = zone.max_size_m = 0;
+    next.push_back(std::move(zone));
+  }
+  return next;
+}
+
+/// "zone NAME" of each that only a restart can change.
+void refuse_zones(const config::Configuration& running, const config::Configuration& wanted,
+                  std::vector<std::string>& refused) {
+  const std::string& volume = running.objects.volume;
+  const Zones before = of_pipeline(running.zones, volume);
+  const Zones after = of_pipeline(wanted.zones, volume);
+  if (before == after) return;
+  const std::size_t known = refused.size();
+  for (const config::ZoneConfig& zone : before) {
+    const config::ZoneConfig* now = find(after, zone.name);
+    if (now == nullptr || !(*now == zone)) refused.push_back("zone " + zone.name);
+  }
+  for (const config::ZoneConfig& zone : after) {
+    if (find(before, zone.name) == nullptr) refused.push_back("zone " + zone.name);
+  }
+  if (refused.size() == known) refused.emplace_back("zone: the order");
+}
 
 }  // namespace
 
@@ -41,7 +95,7 @@ config::Configuration accepted(const config::Configuration& running, const confi
     next.telemetry.multicast_ttl = wanted.telemetry.multicast_ttl;
   }
   if (difference.rules) {
-    next.zones = wanted.zones;
+    next.zones = zones_after(running, wanted);
     next.signals = wanted.signals;
   }
   if (difference.inputs) {
@@ -70,7 +124,8 @@ Difference difference(const config::Configuration& running, const config::Config
     }
   }
   difference.inputs = difference.inputs || running.inputs != wanted.inputs;
-  if (running.zones == wanted.zones && running.signals == wanted.signals) return difference;
+  refuse_zones(running, wanted, difference.refused);
+  if (running.zones == zones_after(running, wanted) && running.signals == wanted.signals) return difference;
   // A rule may change under a line; the lines themselves were requested at start.
   if (signals::line_specs(running) == signals::line_specs(wanted)) {
     difference.rules = true;

@@ -1,6 +1,7 @@
 #include "pipeline/motion/foreground_mask.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include "pipeline/motion/adaptive_background.hpp"
 
@@ -12,17 +13,24 @@ constexpr int kStepsPerSd = AdaptiveBackground::kStepsPerSd;
 
 }  // namespace
 
-Result<ForegroundMask> ForegroundMask::create(const Config& config, int width, int height, Arena& arena) noexcept {
+Result<ForegroundMask> ForegroundMask::create(const Config& config, int width, int height, Arena& arena,
+                                              const BitMask& ignored) noexcept {
   if (!(config.low_sd > 0) || !(config.high_sd >= config.low_sd) || !(config.high_sd <= 60) ||
       !(config.faint_sd >= 0.5) || !(config.faint_sd <= 60) || config.halo_percent < 0 || config.halo_percent > 90 ||
       config.min_seeds < 1 || config.max_runs < 1) {
     return fail(Fault::kBadConfig);
   }
   if (width < 1 || height < 1) return fail(Fault::kBadSize);
+  if (ignored.width != 0 && (ignored.width != width || ignored.height != height)) return fail(Fault::kBadSize);
   const auto steps = [](double sd) { return static_cast<int>(sd * kStepsPerSd + 0.5); };
   ForegroundMask self;
   self.width_ = width;
   self.height_ = height;
+  self.ignored_ = ignored;
+  self.looked_at_px_ = static_cast<double>(width) * height;
+  for (int y = 0; y < ignored.height; ++y) {
+    for (int w = 0; w < ignored.words_a_row(); ++w) self.looked_at_px_ -= std::popcount(ignored.row(y)[w]);
+  }
   self.limits_ = {steps(config.low_sd), steps(config.faint_sd), config.halo_percent};
   self.high_ = steps(config.high_sd);
   self.min_seeds_ = config.min_seeds;
@@ -40,6 +48,9 @@ Result<double> ForegroundMask::run(ImageView<const std::uint8_t> distance, Image
   if (!fits(distance) || !fits(mask)) return fail(Fault::kBadSize);
   mark_candidates(distance, limits_, work_);
   keep_majority(work_, majority_);
+  for (int y = 0; y < ignored_.height; ++y) {
+    for (int w = 0; w < ignored_.words_a_row(); ++w) majority_.row(y)[w] &= ~ignored_.row(y)[w];
+  }
   return keep_seeded(distance, mask);
 }
 
@@ -61,7 +72,7 @@ double ForegroundMask::keep_seeded(ImageView<const std::uint8_t> distance, Image
     std::fill_n(mask.row(run.y) + run.begin, run.length(), std::uint8_t{255});
     kept += run.length();
   }
-  return static_cast<double>(kept) / (static_cast<double>(width_) * height_);
+  return looked_at_px_ > 0 ? static_cast<double>(kept) / looked_at_px_ : 0.0;
 }
 
 }  // namespace stereotrack

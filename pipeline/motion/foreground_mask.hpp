@@ -19,6 +19,7 @@ namespace stereotrack {
 ///    largest distance within 2 px is rim, not object;
 /// 3. a pixel stays if most of its 3x3 neighbourhood are candidates, which removes single noisy pixels;
 /// 4. components without enough seeds go: weak pixels count only where they hang on strong ones.
+/// Pixels that are ignored count in steps 1 to 3, so that what lies beside them is judged as anywhere; then they go.
 /// In: distance, u8, AdaptiveBackground::kStepsPerSd a standard deviation. Out: 0 or 255, same size. O(pixels). One
 /// instance a thread.
 class ForegroundMask {
@@ -33,10 +34,12 @@ class ForegroundMask {
   };
 
   /// Faults: kBadConfig, kBadSize, kOutOfMemory.
-  [[nodiscard]] static Result<ForegroundMask> create(const Config& config, int width, int height,
-                                                     Arena& arena) noexcept;
+  /// ignored: pixels that are never foreground, width x height, which must outlive this; width 0: none.
+  [[nodiscard]] static Result<ForegroundMask> create(const Config& config, int width, int height, Arena& arena,
+                                                     const BitMask& ignored = {}) noexcept;
 
-  /// Fault: kBadSize, mask untouched. Returns the part of the picture that is foreground, 0..1.
+  /// Fault: kBadSize, mask untouched. Returns the part of the picture, of what is not ignored, that is foreground,
+  /// 0..1.
   [[nodiscard]] Result<double> run(ImageView<const std::uint8_t> distance, ImageView<std::uint8_t> mask) noexcept;
 
   /// Runs of the last mask that found no room among max_runs: what lies below them counts as background.
@@ -47,6 +50,8 @@ class ForegroundMask {
 
   int width_ = 0;
   int height_ = 0;
+  BitMask ignored_;
+  double looked_at_px_ = 0;
   CandidateLimits limits_;
   int high_ = 0;
   int min_seeds_ = 0;

@@ -103,6 +103,18 @@ void fill_from_bits(const std::uint64_t* words, int width, std::uint8_t* pixels)
   for (; x < width; ++x) pixels[x] = (words[x / 64] >> x % 64 & 1) != 0 ? 255 : 0;
 }
 
+void clear_where_bits(const std::uint64_t* words, int width, std::uint8_t* pixels) noexcept {
+  for (int x = 0; x < width; x += 64) {
+    // Run by run: a mask's words are mostly all of one kind.
+    for (std::uint64_t bits = words[x / 64]; bits != 0;) {
+      const int begin = std::countr_zero(bits);
+      const int count = std::countr_one(bits >> begin);
+      std::memset(pixels + x + begin, 0, static_cast<std::size_t>(count));
+      bits = begin + count == 64 ? 0 : bits & ~std::uint64_t{0} << (begin + count);
+    }
+  }
+}
+
 void row_bits(const std::uint8_t* pixels, int width, std::uint64_t* words) noexcept {
   const int done = simd_in_use() == SimdTarget::kScalar ? 0 : HWY_DYNAMIC_DISPATCH(words_of)(pixels, width, words);
   row_bits_reference(pixels + 64 * done, width - 64 * done, words + done);

@@ -16,6 +16,9 @@ void row_bits_reference(const std::uint8_t* pixels, int width, std::uint64_t* wo
 /// The other way: 255 where a row's bit is set, else 0. Plain C++: words are mostly all of one kind.
 void fill_from_bits(const std::uint64_t* words, int width, std::uint8_t* pixels) noexcept;
 
+/// 0 where a row's bit is set; the other pixels stay as they are. Plain C++, likewise.
+void clear_where_bits(const std::uint64_t* words, int width, std::uint8_t* pixels) noexcept;
+
 /// Calls fn(begin, end) for each run of set pixels of a row, from left to right. fn may change the row from `begin` to
 /// `end`. A step costs by run, not by pixel.
 template <class Fn>

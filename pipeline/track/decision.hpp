@@ -17,11 +17,17 @@ enum class Rejection : std::uint8_t {
   kShadow,        ///< the shadow test left nothing of it
   kOwnSurface,    ///< its disparity is the background's own: light, a shadow or a mark
   kNoRoom,        ///< more runs of the mask, blobs or candidates than there is room for
+  kOutside,       ///< outside of the working volume: ZoneRules
+  kIgnored,       ///< in a box in space whose targets are ignored
+  kUnderSize,     ///< smaller in metres than is tracked there
+  kOverSize,      ///< larger in metres
+  kNoneBegin,     ///< a detection, no known target's, where or when none begins: ZoneRules, PairCheck
 };
-inline constexpr std::size_t kRejections = 6;
+inline constexpr std::size_t kRejections = 11;
 [[nodiscard]] constexpr const char* to_string(Rejection why) noexcept {
-  constexpr std::array<const char*, kRejections> kNames{"small",  "no_texture",  "inconsistent_depth",
-                                                        "shadow", "own_surface", "no_room"};
+  constexpr std::array<const char*, kRejections> kNames{
+      "small",          "no_texture",   "inconsistent_depth", "shadow",    "own_surface", "no_room",
+      "outside_volume", "ignored_zone", "under_size",         "over_size", "none_begin"};
   return kNames[static_cast<std::size_t>(why)];
 }
 using RejectionCounts = std::array<std::uint32_t, kRejections>;
@@ -76,6 +82,7 @@ struct Decision {
     kMissed,     ///< no detection was the target's: unseen_s of limit_s
     kBorn,       ///< a tentative target from a detection; other: the target of whose region it is a part
     kNoRoom,     ///< a detection that would have been one, but there are Tracker::kMaxTracks
+    kNoneBegin,  ///< a detection that would have been one, but it may not begin one: detection
     kConfirmed,  ///< believed from now on
     kWaits,      ///< took a detection, but is not believed yet: hits, evidence, way_px, path_px, other (on trial)
     kRemoved,    ///< removal; other: the target that it belongs to
@@ -108,6 +115,7 @@ struct RejectedCandidate {
   int area = 0;  ///< [px]
   bool has_depth = false;
   double disparity = 0;  ///< [px]
+  double size_m = 0;     ///< its longer side, of what is rejected for it [m]
 };
 
 /// A pair of which both pictures do not show one instant: PairCheck.

@@ -558,9 +558,10 @@ bool Detector::describe(const Input& in, const Candidate& candidate, Detection& 
   return true;
 }
 
-void Detector::reject(const Input& in, const Candidate& candidate, Rejection why) noexcept {
+void Detector::reject(const Input& in, const Candidate& candidate, Rejection why, double size_m) noexcept {
   reject(why);
-  in.observer.tell(RejectedCandidate{why, candidate.box, candidate.area, candidate.has_depth, candidate.disparity});
+  in.observer.tell(
+      RejectedCandidate{why, candidate.box, candidate.area, candidate.has_depth, candidate.disparity, size_m});
 }
 
 void Detector::distrust_depth() noexcept {
@@ -606,6 +607,14 @@ std::span<const Detection> Detector::conclude(const Input& in) noexcept {
     if (detections_.full() || !describe(in, candidate, detection)) {
       reject(in, candidate, Rejection::kNoRoom);
       continue;
+    }
+    if (in.rules != nullptr) {
+      const ZoneRules::Verdict verdict = in.rules->judge(detection, known, in.rectifier);
+      if (verdict.why) {
+        reject(in, candidate, *verdict.why, verdict.size_m);
+        continue;
+      }
+      detection.may_begin = in.rules->may_begin(detection);
     }
     (void)detections_.push(detection);
     relabel_region(in.labels, candidate.box, candidate.label, static_cast<std::uint16_t>(offset | detections_.size()));

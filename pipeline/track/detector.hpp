@@ -15,6 +15,7 @@
 #include "pipeline/track/decision.hpp"
 #include "pipeline/track/depth_segments.hpp"
 #include "pipeline/track/detection.hpp"
+#include "pipeline/track/zone_rules.hpp"
 
 namespace stereotrack {
 
@@ -64,6 +65,7 @@ class Detector {
     ImageView<const std::uint8_t> strength;  ///< distance to the background, any unit
     std::span<const Prediction> predictions;
     const Rectifier* rectifier = nullptr;  ///< null for mono
+    const ZoneRules* rules = nullptr;      ///< what is tracked where; null: everything everywhere
     DecisionObserver observer;             ///< of what is rejected
   };
 
@@ -95,7 +97,7 @@ class Detector {
   /// objects, where single pixels have none) before conclude(). Valid until the next segment().
   [[nodiscard]] std::span<Candidate> segment(const Input& in) noexcept;
 
-  /// Rejects, and makes detections of the rest, largest first. Valid until the next conclude().
+  /// Rejects, by in.rules last, and makes detections of the rest, largest first. Valid until the next conclude().
   [[nodiscard]] std::span<const Detection> conclude(const Input& in) noexcept;
 
   /// The right picture was of another instant: the detections of the last conclude() are left without depth, and none
@@ -140,7 +142,7 @@ class Detector {
                                      const Rect& united) const noexcept;
   [[nodiscard]] bool describe(const Input& in, const Candidate& candidate, Detection& out) noexcept;
   void reject(Rejection why) noexcept { ++rejections_[static_cast<std::size_t>(why)]; }
-  void reject(const Input& in, const Candidate& candidate, Rejection why) noexcept;
+  void reject(const Input& in, const Candidate& candidate, Rejection why, double size_m = 0) noexcept;
 
   Config config_;
   int width_ = 0;

@@ -582,6 +582,16 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   }
 }
 
+// What begins elsewhere goes on here, confirmed or not.
+void Tracker::hold_back(std::uint16_t label) noexcept {
+  ++held_back_;
+  if (observer_.decided == nullptr) return;
+  Decision said;
+  said.kind = Decision::Kind::kNoneBegin;
+  said.detection = label;
+  observer_.tell(said);
+}
+
 bool Tracker::close_together(const Target& a, const Target& b) const noexcept {
   const double size = std::max({a.width, a.height, b.width, b.height});
   const int shared_columns = std::min(a.box.right(), b.box.right()) - std::max(a.box.left, b.box.left);
@@ -663,6 +673,7 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
                      ImageView<const std::uint16_t> labels) noexcept {
   detections = detections.first(std::min<std::size_t>(detections.size(), kMaxDetections));
   std::fill(detection_used_.begin(), detection_used_.end(), static_cast<unsigned char>(0));
+  held_back_ = 0;
   for (Target& target : targets_) {
     target.measured = false;
     target.age_s += dt_;
@@ -685,7 +696,13 @@ void Tracker::update(std::span<const Detection> detections, ImageView<const std:
     return !why;
   });
   for (std::size_t j = 0; j < detections.size(); ++j) {
-    if (detection_used_[j] == 0 && detections[j].may_begin) start(detections[j], static_cast<std::uint16_t>(j + 1));
+    if (detection_used_[j] != 0) continue;
+    const auto label = static_cast<std::uint16_t>(j + 1);
+    if (detections[j].may_begin) {
+      start(detections[j], label);
+    } else {
+      hold_back(label);
+    }
   }
   for (Target& target : targets_) follow_parent(target);
   drop_twins();

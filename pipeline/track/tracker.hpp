@@ -45,11 +45,12 @@ namespace stereotrack {
 /// Features: each target carries corners of its surface, searched in the window that their own filters predict
 /// (features.hpp). Those found vote for the detection in whose box they lie.
 ///
-/// Life: a detection without a target starts a tentative one. It is confirmed by confirm_hits detections whose
-/// strengths add up to confirm_evidence, if it has got somewhere meanwhile: at least travel_px in the picture and
-/// straight_part of the path it took (flicker jumps to and fro), or a twentieth of its distance. tentative_misses
-/// frames in a row without detection remove it. A confirmed target without detection coasts on its prediction for
-/// coast_s, but no longer than 0.2 s and half the time for which it was seen, or until it left the picture.
+/// Life: a detection without a target starts a tentative one, if it may (Detection::may_begin). It is confirmed by
+/// confirm_hits detections whose strengths add up to confirm_evidence, if it has got somewhere meanwhile: at least
+/// travel_px in the picture and straight_part of the path it took (flicker jumps to and fro), or a twentieth of its
+/// distance. tentative_misses frames in a row without detection remove it. A confirmed target without detection coasts
+/// on its prediction for coast_s, but no longer than 0.2 s and half the time for which it was seen, or until it left
+/// the picture.
 ///
 /// Twins: an object that came into view in pieces has a target for each. Two that stay close together, at one depth and
 /// without a change of their places, while they move by a size (10 frames; 30 for what stands still) are one object:
@@ -104,6 +105,9 @@ class Tracker {
 
   /// Detections that found no room for a new target, since the start.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+
+  /// Detections of the last update() that are no target's and with which none may begin.
+  [[nodiscard]] std::uint32_t held_back() const noexcept { return held_back_; }
 
   /// What crosses frames: pipeline/core/state.hpp.
   template <class Self, class Archive>
@@ -204,6 +208,7 @@ class Tracker {
                       ImageView<const std::uint16_t> labels) noexcept;
   void miss(Target& target) noexcept;
   void start(const Detection& detection, std::uint16_t label) noexcept;
+  void hold_back(std::uint16_t label) noexcept;
   [[nodiscard]] bool close_together(const Target& a, const Target& b) const noexcept;
   void follow_twin(Target& target) noexcept;
   void drop_twins() noexcept;
@@ -229,6 +234,7 @@ class Tracker {
   double dt_ = 0;
   std::uint32_t next_id_ = 1;
   std::uint64_t refused_ = 0;
+  std::uint32_t held_back_ = 0;
   BoundedVector<Target> targets_;
   BoundedVector<Prediction> predictions_;
   BoundedVector<TrackReport> reports_;

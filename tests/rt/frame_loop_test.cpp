@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "config/zones.hpp"
 #include "pipeline/core/arena.hpp"
 #include "pipeline/pipeline.hpp"
 #include "tests/rt/heap_watch.hpp"
@@ -158,6 +159,42 @@ TEST(FrameLoopStages, LevelSetWorksOnTheSceneInTheThesisPreset) {
   without.run(kWarmUp);
   ASSERT_GT(with.outcome.mask_px, 0U);
   EXPECT_NE(with.outcome.mask_sum, without.outcome.mask_sum);
+}
+
+// With rules about places and sizes at work, too: boards pass through each of them.
+TEST(FrameLoopStages, RulesAboutZonesTakeNothingFromTheHeap) {
+  const SceneCase one{"robust", &kSceneFormats[0], SceneMatching::kRegions};
+  config::Configuration said =
+      config::load(std::vector{config::override_layer("disparity.max=48"), config::text_layer("rig.toml", R"(
+[objects]
+volume = "hall"
+min_size_m = 0.1
+max_size_m = 0.8
+[[zone]]
+name = "hall"
+z_m = [1, 3]
+[[zone]]
+name = "pole"
+picture = [[60, -1], [75, -1], [80, 200], [55, 200]]
+targets = "ignore"
+[[zone]]
+name = "door"
+picture = [[-1, -1], [40, -1], [40, 200], [-1, 200]]
+targets = "none_begin"
+)")})
+          .configuration;
+  Loop with(one, config::pipeline_of(said, 1));
+  said.zones.clear();
+  said.objects.volume.clear();
+  said.pipeline.zones = {};
+  Loop without(one, config::pipeline_of(said, 1));
+  with.run(500);
+  without.run(500);
+  EXPECT_EQ(with.outcome.heap_calls, 0U);
+  EXPECT_EQ(with.pipeline().memory().total(), with.arena().bytes_used());
+  EXPECT_GT(with.arena().bytes_used(), without.arena().bytes_used()) << "a mask";
+  EXPECT_GT(with.outcome.detections, 100U);
+  EXPECT_LT(with.outcome.detections, without.outcome.detections);
 }
 
 // The guard stands around the whole of Pipeline::run: what is done in the midst of it, in one frame, is found there.

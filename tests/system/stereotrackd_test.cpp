@@ -337,6 +337,30 @@ TEST(Stereotrackd, SighupNeverPutsARuleOnAnotherLine) {
   EXPECT_EQ(daemon.wait().exit_code, 0);
 }
 
+// What is tracked where is the pipeline's, which does not change while it runs; the same file's zone of a signal does.
+TEST(Stereotrackd, SighupNamesTheZonesThatWaitForARestart) {
+  const TempDir folder;
+  const auto with = [&](const std::string& gate, const std::string& targets) {
+    return small(folder.path(), "[[zone]]\nname = \"gate\"\nz_m = [0.1, " + gate +
+                                    "]\n[[zone]]\nname = \"pole\"\npicture = [[0, 0], [9, 0], [9, 9]]\ntargets = \"" +
+                                    targets +
+                                    "\"\n[[signal]]\nname = \"in\"\nline = \"sim:in\"\nwhen = "
+                                    "\"in_zone\"\nzone = \"gate\"\n");
+  };
+  Program daemon({kDaemon, "--config", with("5", "ignore")});
+  ASSERT_TRUE(wait_for([&] { return has_started(daemon); })) << daemon.err_so_far();
+  (void)with("6", "none_begin");
+  ASSERT_EQ(kill(daemon.pid(), SIGHUP), 0);
+  EXPECT_TRUE(wait_for([&] { return daemon.err_so_far().find("reload: taken over") != std::string::npos; }))
+      << daemon.err_so_far();
+  EXPECT_NE(daemon.err_so_far().find("reload: zone pole: cannot change while the daemon runs, restart it"),
+            std::string::npos)
+      << daemon.err_so_far();
+  EXPECT_EQ(daemon.err_so_far().find("reload: zone gate"), std::string::npos) << daemon.err_so_far();
+  ASSERT_EQ(kill(daemon.pid(), SIGTERM), 0);
+  EXPECT_EQ(daemon.wait().exit_code, 0);
+}
+
 TEST(Stereotrackd, AFaultMakesTheLinesSafeAndTellsTheLastOutputs) {
   const TempDir folder;
   Ear ear;

@@ -87,8 +87,10 @@ class Player {
     info_.period = nanoseconds(std::llround(1e9 / options.fps));
     told_.period_ms = static_cast<double>(info_.period.count()) * 1e-6;
     draw(*capture::open_synthetic("eleven", options), time);
-    pipeline_ = std::make_unique<Pipeline>(
-        make_pipeline(configuration.pipeline, told_.stereo ? &calibration_ : nullptr, info_, arena_));
+    PipelineConfig everywhere = configuration.pipeline;
+    everywhere.zones = {};  // they are places of another scene
+    pipeline_ =
+        std::make_unique<Pipeline>(make_pipeline(everywhere, told_.stereo ? &calibration_ : nullptr, info_, arena_));
     told_.memory_mb = static_cast<double>(arena_.bytes_used()) / (1 << 20);
     arena_.seal();
     compute_ns_.reserve(static_cast<std::size_t>(time / info_.period) + kLeastFrames + 64);

@@ -59,6 +59,40 @@ TEST(ForegroundMask, StrongObjectIsKeptButForItsCorners) {
   EXPECT_DOUBLE_EQ(out.share, (12 * 9 - 4) / (64.0 * 48.0));
 }
 
+TEST(ForegroundMask, IgnoredPixelsAreNeverForegroundAndNoPartOfThePicture) {
+  Plane distance = quiet();
+  distance(cv::Rect(20, 10, 24, 9)).setTo(12 * kStep);
+  Arena arena;
+  const BitMask ignored = BitMask::create(kSize.width, kSize.height, arena);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < 32; ++x) ignored.set(x, y, true);
+  }
+  auto stage = ForegroundMask::create(config(), kSize.width, kSize.height, arena, ignored);
+  ASSERT_TRUE(stage.has_value());
+  Plane mask(kSize, std::uint8_t{7});
+  const Result<double> share = stage->run(view(distance), view(mask));
+  ASSERT_TRUE(share.has_value());
+  Plane expected = quiet();
+  expected(cv::Rect(32, 10, 12, 9)).setTo(255);
+  expected(10, 43) = expected(18, 43) = 0;  // what is ignored keeps its vote: no corner on its side
+  EXPECT_EQ(cv::countNonZero(mask != expected), 0);
+  EXPECT_DOUBLE_EQ(*share, (12 * 9 - 2) / (32.0 * 48.0));
+}
+
+TEST(ForegroundMask, WhereAllIsIgnoredNothingIsForeground) {
+  Plane distance(kSize, std::uint8_t{12 * kStep});
+  Arena arena;
+  const BitMask ignored = BitMask::create(kSize.width, kSize.height, arena);
+  for (int y = 0; y < kSize.height; ++y) ignored.row(y)[0] = ~std::uint64_t{0};
+  auto stage = ForegroundMask::create(config(), kSize.width, kSize.height, arena, ignored);
+  ASSERT_TRUE(stage.has_value());
+  Plane mask(kSize, std::uint8_t{7});
+  EXPECT_EQ(*stage->run(view(distance), view(mask)), 0);
+  EXPECT_EQ(cv::countNonZero(mask), 0);
+  const BitMask other = BitMask::create(kSize.width, kSize.height - 1, arena);
+  EXPECT_EQ(ForegroundMask::create(config(), kSize.width, kSize.height, arena, other).error(), Fault::kBadSize);
+}
+
 TEST(ForegroundMask, SingleNoisyPixelsAreRemoved) {
   Plane distance = quiet();
   for (int y = 1; y < kSize.height; y += 3) {

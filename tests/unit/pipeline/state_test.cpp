@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "config/zones.hpp"
 #include "pipeline/core/state_block.hpp"
 #include "pipeline/pipeline.hpp"
 #include "tests/support/moving_scene.hpp"
@@ -38,6 +39,7 @@ std::vector<StateCase> state_cases() {
     cases.push_back({robust, {"equalise.mode=frozen"}});
     cases.push_back({robust, {"level_set.on=true", "shape.hole_px=4000"}});
     cases.push_back({robust, {"background.frames=3", "background.absorb_frames=20"}});
+    cases.push_back({robust, {"objects.min_size_m=0.3", "objects.max_size_m=1"}});
     cases.push_back({{"robust", format, SceneMatching::kMono}, {"equalise.mode=frame"}});
     cases.push_back({{"thesis", format, SceneMatching::kRegions}, {"background.frames=500"}});
   }
@@ -50,7 +52,7 @@ PipelineConfig config_of(const StateCase& one) {
       config::override_layer(std::string("disparity.mode=") +
                              (one.scene.matching == SceneMatching::kDense ? "dense" : "regions"))};
   for (const std::string& key : one.set) layers.push_back(config::override_layer(key));
-  return config::load(layers).configuration.pipeline;
+  return config::pipeline_of(config::load(layers).configuration, 1);
 }
 
 // The moments at which something begins or ends, in turn.
@@ -137,6 +139,21 @@ INSTANTIATE_TEST_SUITE_P(Everywhere, PipelineState, testing::ValuesIn(state_case
                          [](const auto& one) { return one.param.name(); });
 
 StateCase robust() { return {{"robust", kSceneFormats.data(), SceneMatching::kRegions}, {}}; }
+
+TEST(PipelineStateBlock, IsOfTheSameRulesOnly) {
+  StateCase sized = robust();
+  sized.set = {"objects.max_size_m=1"};
+  StateCase other = robust();
+  other.set = {"objects.max_size_m=2"};
+  ScenePipeline without(robust());
+  ScenePipeline one(sized);
+  ScenePipeline two(other);
+  const std::vector<std::byte> block = one.save();
+  EXPECT_TRUE(one.pipeline().restore_state(block).has_value());
+  EXPECT_EQ(two.pipeline().restore_state(block).error(), Fault::kBadState);
+  EXPECT_EQ(without.pipeline().restore_state(block).error(), Fault::kBadState);
+  EXPECT_EQ(one.pipeline().restore_state(without.save()).error(), Fault::kBadState);
+}
 
 TEST(PipelineStateBlock, PartsJoinToTheWhole) {
   ScenePipeline run(robust());

@@ -52,6 +52,22 @@ TEST(BitsKernel, BitsFillTheRowTheyCameFromAndNothingBeyond) {
   }
 }
 
+TEST(BitsKernel, PixelsAreClearedWhereBitsAreAndNowhereElse) {
+  std::mt19937 random(11);
+  for (const int width : {1, 63, 64, 65, 128, 200}) {
+    std::vector<std::uint64_t> words(static_cast<std::size_t>((width + 63) / 64));
+    for (std::size_t w = 0; w < words.size(); ++w) words[w] = w % 2 == 0 ? random() * 0x100000001U : ~std::uint64_t{0};
+    if (width % 64 != 0) words.back() &= ~std::uint64_t{0} >> (64 - width % 64);
+    std::vector<std::uint8_t> got(static_cast<std::size_t>(width) + 8, 99);
+    clear_where_bits(words.data(), width, got.data());
+    for (int x = 0; x < width + 8; ++x) {
+      const auto i = static_cast<std::size_t>(x);
+      const bool cleared = x < width && (words[i / 64] >> i % 64 & 1) != 0;
+      ASSERT_EQ(got[i], cleared ? 0 : 99) << width << " " << x;
+    }
+  }
+}
+
 TEST(BitsKernel, RunsAreThoseOfThePixels) {
   std::mt19937 engine(4);
   for (const int width : {0, 1, 63, 64, 65, 128, 640, 2048, 2049, 5000}) {

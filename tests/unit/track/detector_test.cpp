@@ -104,6 +104,7 @@ class DetectorOf : public testing::Test {
     in.y = view(y_);
     in.strength = view(strength_);
     in.predictions = predictions;
+    in.rules = rules_ ? &*rules_ : nullptr;
     in.observer = {nullptr, &DetectorOf::told, this};
     return in;
   }
@@ -131,6 +132,13 @@ class DetectorOf : public testing::Test {
   cv::Mat_<std::uint8_t> strength_{cv::Size(kWidth, kHeight), std::uint8_t{40}};
   std::vector<Blob> blobs_;
   std::optional<Detector> detector_;
+  std::optional<ZoneRules> rules_;
+
+  void rule(const ZoneRules::Config& c) {
+    auto created = ZoneRules::create(c, kWidth, kHeight, arena_);
+    ASSERT_TRUE(created.has_value());
+    rules_.emplace(*created);
+  }
 
  private:
   Arena arena_;
@@ -559,6 +567,60 @@ TEST_F(DetectorOf, CallerMayGiveACandidateItsDisparity) {
   EXPECT_EQ(rejected(), 0U);
 }
 
+TEST_F(DetectorOf, WhatIsOutsideOfTheVolumeIsNoDetectionThoughATargetClaimsIt) {
+  Zone near;
+  near.x_m = near.y_m = {-100, 100};
+  near.z_m = {0, 4};
+  rule({.volume = near, .unit_m = 1});
+  paint(1, {20, 40, 20, 16}, 20);   // Z = 5
+  paint(2, {100, 40, 20, 16}, 40);  // Z = 2.5
+  const std::span<const Detection> found = run({expected(1, {20, 40, 20, 16}, 20)});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].box.left, 100);
+  EXPECT_EQ(labels_(48, 30), 0) << "and its pixels are no object's";
+  EXPECT_EQ(rejected(Rejection::kOutside), 1U);
+  EXPECT_EQ(rejected(), 1U);
+  ASSERT_EQ(told_.size(), 1U);
+  EXPECT_EQ(told_[0].why, Rejection::kOutside);
+  EXPECT_EQ(told_[0].box, (Rect{20, 40, 20, 16}));
+}
+
+TEST_F(DetectorOf, SizeIsThatOfNewObjectsAndIsTold) {
+  rule({.max_size_m = 0.4, .unit_m = 1});
+  paint(1, {20, 40, 20, 16}, 20);   // 20 px at Z = 5, f = 200: 0.5
+  paint(2, {100, 40, 20, 16}, 40);  // 0.25
+  std::span<const Detection> found = run();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].box.left, 100);
+  EXPECT_EQ(rejected(Rejection::kOverSize), 1U);
+  ASSERT_EQ(told_.size(), 1U);
+  EXPECT_NEAR(told_[0].size_m, 0.5, 0.02);
+  labels_.setTo(0);
+  paint(1, {20, 40, 20, 16}, 20);
+  paint(2, {100, 40, 20, 16}, 40);
+  found = run({expected(1, {20, 40, 20, 16}, 20)});
+  EXPECT_EQ(found.size(), 2U) << "a target that is known";
+  EXPECT_EQ(rejected(), 0U);
+}
+
+TEST_F(DetectorOf, WhereNoneBeginsIsADetectionThatSaysSo) {
+  ZoneRules::Config c;
+  Zone door;
+  door.kind = Zone::Kind::kPicture;
+  for (const Zone::Corner& corner : {Zone::Corner{0, 0}, {60, 0}, {60, 120}, {0, 120}}) {
+    ASSERT_TRUE(door.corners.push(corner));
+  }
+  ASSERT_TRUE(c.zones.push({.zone = door, .targets = ZoneRules::Targets::kNoneBegin}));
+  rule(c);
+  paint(1, {20, 40, 20, 16}, 20);
+  paint(2, {100, 40, 24, 16}, 40);
+  const std::span<const Detection> found = run();
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_TRUE(found[0].may_begin);
+  EXPECT_FALSE(found[1].may_begin);
+  EXPECT_EQ(rejected(), 0U);
+}
+
 TEST_F(DetectorOf, OneDetectionMoreThanTheCapacityIsRejectedAndCounted) {
   Detector::Config c = config();
   c.merge_gap = 0;
@@ -584,6 +646,8 @@ TEST(Detector, EveryRejectionHasAName) {
   EXPECT_STREQ(to_string(Rejection::kSmall), "small");
   EXPECT_STREQ(to_string(Rejection::kOwnSurface), "own_surface");
   EXPECT_STREQ(to_string(Rejection::kNoRoom), "no_room");
+  EXPECT_STREQ(to_string(Rejection::kOutside), "outside_volume");
+  EXPECT_STREQ(to_string(Rejection::kNoneBegin), "none_begin");
 }
 
 TEST(Detector, Faults) {

@@ -948,6 +948,50 @@ TEST_F(TrackerTells, WhichGateForbadeAPair) {
   EXPECT_TRUE(std::isinf(pair(3).cost.sum()));
 }
 
+Detection not_to_begin(Detection detection) {
+  detection.may_begin = false;
+  return detection;
+}
+
+TEST_F(TrackerTells, NoneBeginsWithADetectionThatMayNot) {
+  for (int i = 0; i < 10; ++i) {
+    told_.clear();
+    step({seen_at(100 + 4 * i, 200, 20), not_to_begin(seen_at(400 + 4 * i, 200, 20))});
+    ASSERT_EQ(reports().size(), 1U);
+    EXPECT_EQ(tracker_->held_back(), 1U);
+    const auto told =
+        std::find_if(told_.begin(), told_.end(), [](const Decision& one) { return one.kind == Kind::kNoneBegin; });
+    ASSERT_NE(told, told_.end());
+    EXPECT_EQ(told->detection, 2);
+    EXPECT_EQ(told->id, 0U);
+  }
+  EXPECT_EQ(tracker_->refused(), 0U) << "there is room";
+  step({seen_at(140, 200, 20)});
+  EXPECT_EQ(tracker_->held_back(), 0U);
+  step({seen_at(144, 200, 20), seen_at(440, 200, 20)});
+  EXPECT_EQ(reports().size(), 2U) << "once it may";
+  EXPECT_EQ(reports()[1].id, 2U) << "no id was spent";
+}
+
+TEST_F(TrackerTells, WhatBeganElsewhereGoesOnWhereNoneBegins) {
+  for (int i = 0; i < 10; ++i) step({seen_at(100 + 4 * i, 200, 20)});
+  for (int i = 10; i < 20; ++i) {
+    step({not_to_begin(seen_at(100 + 4 * i, 200, 20))});
+    EXPECT_EQ(tracker_->held_back(), 0U);
+  }
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_EQ(reports()[0].id, 1U);
+  EXPECT_EQ(reports()[0].state, TrackState::kConfirmed);
+  EXPECT_TRUE(reports()[0].measured);
+}
+
+TEST_F(TrackerTells, ATentativeOneThatBeganElsewhereIsConfirmedThere) {
+  step({seen_at(100, 200, 20)});
+  for (int i = 1; i < 4; ++i) step({not_to_begin(seen_at(100 + 6 * i, 200, 20))});
+  ASSERT_EQ(reports().size(), 1U);
+  EXPECT_EQ(reports()[0].state, TrackState::kConfirmed);
+}
+
 TEST(Tracker, Faults) {
   Arena arena;
   const double nan = std::numeric_limits<double>::quiet_NaN();
