@@ -33,7 +33,7 @@ enum Flag : std::uint32_t {
   kEffortShed = 256,    ///< see Live::efforts_shed
   kClockStepped = 512,  ///< of the capture clock, since the message before
   kStateAtOutput =
-      1024,  ///< positions, velocities, covariances are predicted to when the message is due, not of capture
+      1024,           ///< positions, velocities, covariances are predicted to when the message is due, not of capture
   kWrongPair = 2048,  ///< both pictures are not of one instant, told by what moves: no depth was measured
 };
 

@@ -58,7 +58,8 @@ const char* reason(Rejection why) {
     case Rejection::kIgnored: return "in a zone whose targets are ignored";
     case Rejection::kUnderSize: return "under min_size_m of [objects] or of its zone";
     case Rejection::kOverSize: return "over max_size_m of [objects] or of its zone";
-    case Rejection::kNoneBegin: return "no target begins in its zone, or in a wrong pair";  // of a detection: told as its fate
+    case Rejection::kNoneBegin:
+      return "no target begins in its zone, or in a wrong pair";  // of a detection: told as its fate
   }
   return "";
 }
@@ -124,9 +125,10 @@ const render::Annotation& Explanation::frame_ends(const FrameResult& result, dou
   if (ids.empty() && (request_.id != 0 || !wanted)) return annotation_;
   say(format("frame %llu, %.3f s", static_cast<unsigned long long>(result.ordinal), seconds));
   if (wrong_pair_) {
-    say(format("  wrong pair: the right picture is %.0f ms %s than the left one, told by %d target%s; no depth is taken",
-               1000 * std::abs(wrong_pair_->lag_s), wrong_pair_->lag_s > 0 ? "later" : "earlier",
-               wrong_pair_->witnesses, wrong_pair_->witnesses == 1 ? "" : "s"));
+    say(format(
+        "  wrong pair: the right picture is %.0f ms %s than the left one, told by %d target%s; no depth is taken",
+        1000 * std::abs(wrong_pair_->lag_s), wrong_pair_->lag_s > 0 ? "later" : "earlier", wrong_pair_->witnesses,
+        wrong_pair_->witnesses == 1 ? "" : "s"));
   }
   if (request_.id == 0) explain_detections(result);
   for (const std::uint32_t id : ids) explain_target(result, id);

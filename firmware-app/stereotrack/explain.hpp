@@ -27,7 +27,9 @@ class Explanation {
   /// unit_m: metres in one unit of the calibration, 0 = not known.
   Explanation(const ExplainRequest& request, const PipelineConfig& config, double unit_m);
 
-  [[nodiscard]] DecisionObserver observer() noexcept { return {&Explanation::decided, &Explanation::rejected, &Explanation::mispaired, this}; }
+  [[nodiscard]] DecisionObserver observer() noexcept {
+    return {&Explanation::decided, &Explanation::rejected, &Explanation::mispaired, this};
+  }
 
   /// Before each frame.
   void frame_begins() noexcept;

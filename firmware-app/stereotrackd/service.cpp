@@ -125,9 +125,10 @@ void Service::log_changes(const Daemon& daemon) {
   log_alarm(telemetry::kHealthExposuresDiffer, "exposure",
             "cameras: left and right are exposed differently, by more than camera.exposure_limit_percent",
             "cameras: left and right are exposed alike again");
-  log_alarm(telemetry::kHealthWrongPairs, "wrong_pair",
-            "cameras: what moves tells that left and right pictures are of different instants; is a frame lost on its way?",
-            "cameras: left and right pictures are of one instant again");
+  log_alarm(
+      telemetry::kHealthWrongPairs, "wrong_pair",
+      "cameras: what moves tells that left and right pictures are of different instants; is a frame lost on its way?",
+      "cameras: left and right pictures are of one instant again");
   health_ = health;
   if (const std::uint64_t by = changed(allocations_, vitals.allocations()); by > 0) {
     log(LogLevel::kError, std::to_string(by) + " heap calls in real-time threads", {{"STEREOTRACK_CAUSE", "heap"}});

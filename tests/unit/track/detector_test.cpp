@@ -105,7 +105,7 @@ class DetectorOf : public testing::Test {
     in.strength = view(strength_);
     in.predictions = predictions;
     in.rules = rules_ ? &*rules_ : nullptr;
-    in.observer = {nullptr, &DetectorOf::told, this};
+    in.observer = {.rejected = &DetectorOf::told, .context = this};
     return in;
   }
   std::span<const Detection> run(const std::vector<Prediction>& predictions = {}, bool stereo = true) {

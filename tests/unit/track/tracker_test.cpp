@@ -864,7 +864,7 @@ class TrackerTells : public TrackerOf {
  protected:
   void SetUp() override {
     make(config());
-    tracker_->observe({&TrackerTells::decided, nullptr, this});
+    tracker_->observe({.decided = &TrackerTells::decided, .context = this});
   }
   static void decided(void* self, const Decision& decision) noexcept {
     static_cast<TrackerTells*>(self)->told_.push_back(decision);
