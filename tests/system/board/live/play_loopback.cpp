@@ -7,8 +7,6 @@
 // by then gets each picture once, in order. Pair k is written at begin + k / FPS by CLOCK_MONOTONIC, left, right: a
 // sleep that ends late moves no later one. At its end it says how many and how late, and keeps the devices until
 // standard input ends.
-//
-// With write(2) and not in the device's own buffers: VIDIOC_REQBUFS of a writer would unmap those of its readers.
 #include <linux/videodev2.h>
 #include <unistd.h>
 
@@ -24,7 +22,7 @@
 #include <vector>
 
 #include "drivers/capture/replay/replay.hpp"
-#include "drivers/capture/v4l2/device.hpp"
+#include "tests/system/board/live/loopback_writer.hpp"
 
 namespace stereotrack {
 namespace {
@@ -45,9 +43,6 @@ void sleep_until(std::int64_t ns) {
   }
 }
 
-/// v4l2loopback's own control, by its number in v4l2loopback.h.
-constexpr std::uint32_t kKeepFormat = V4L2_CID_USER_BASE | 0xf000U;
-
 /// What a driver writes of a frame: its rows, without what lies between.
 std::vector<std::uint8_t> bytes_of(const Picture& picture) {
   std::vector<std::uint8_t> bytes;
@@ -57,36 +52,8 @@ std::vector<std::uint8_t> bytes_of(const Picture& picture) {
 }
 
 Device open_for(const std::string& path, const capture::SourceInfo& info, double fps) {
-  Device device;
-  const auto check = [&](int error, const char* what) {
-    if (error != 0) throw std::runtime_error(path + ": " + what + ": " + std::strerror(error));
-  };
-  check(device.open(path), "cannot be opened");
-  v4l2_format format{};
-  format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-  format.fmt.pix.width = static_cast<std::uint32_t>(info.width);
-  format.fmt.pix.height = static_cast<std::uint32_t>(info.height);
-  format.fmt.pix.pixelformat = info.format == PixelFormat::kBgr8 ? V4L2_PIX_FMT_BGR24 : V4L2_PIX_FMT_GREY;
-  format.fmt.pix.field = V4L2_FIELD_NONE;
-  const std::uint32_t wanted = format.fmt.pix.pixelformat;
-  check(device.ask(VIDIOC_S_FMT, format), "does not take the format");
-  if (format.fmt.pix.pixelformat != wanted || format.fmt.pix.width != static_cast<std::uint32_t>(info.width)) {
-    throw std::runtime_error(path + ": takes another format than that of the pictures");
-  }
-  v4l2_streamparm rate{};
-  rate.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-  rate.parm.output.timeperframe = {1000, static_cast<std::uint32_t>(fps * 1000)};
-  check(device.ask(VIDIOC_S_PARM, rate), "does not take the rate");
-  int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-  const int error = device.ask(VIDIOC_STREAMON, type);
-  if (error == EINVAL) {
-    // From v4l2loopback 0.13 on write(2) starts it, and readers may start before only where the format is kept.
-    v4l2_control keep_format{kKeepFormat, 1};
-    check(device.ask(VIDIOC_S_CTRL, keep_format), "does not keep its format");
-  } else {
-    check(error, "does not start");
-  }
-  return device;
+  const std::uint32_t pixels = info.format == PixelFormat::kBgr8 ? V4L2_PIX_FMT_BGR24 : V4L2_PIX_FMT_GREY;
+  return test::open_loopback(path, info.width, info.height, pixels, fps);
 }
 
 void put(const Device& device, const std::vector<std::uint8_t>& bytes) {

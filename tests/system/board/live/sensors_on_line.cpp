@@ -15,7 +15,7 @@
 //     wire SIDE                   it is on again
 //     count                       says "rises R left L right R": the line's, and pictures that were written
 //
-// Ends with standard input. With write(2), as play_loopback does.
+// Ends with standard input.
 #include <fcntl.h>
 #include <linux/videodev2.h>
 #include <poll.h>
@@ -36,7 +36,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/capture/v4l2/device.hpp"
+#include "tests/system/board/live/loopback_writer.hpp"
 
 namespace stereotrack {
 namespace {
@@ -58,24 +58,8 @@ std::int64_t monotonic_ns() {
 
 class Sensor {
  public:
-  Sensor(const std::string& path, int width, int height, double fps) : path_(path) {
-    const auto check = [&](int error, const char* what) {
-      if (error != 0) throw std::runtime_error(path + ": " + what + ": " + std::strerror(error));
-    };
-    check(device_.open(path), "cannot be opened");
-    v4l2_format format{};
-    format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-    format.fmt.pix.width = static_cast<std::uint32_t>(width);
-    format.fmt.pix.height = static_cast<std::uint32_t>(height);
-    format.fmt.pix.pixelformat = V4L2_PIX_FMT_GREY;
-    format.fmt.pix.field = V4L2_FIELD_NONE;
-    check(device_.ask(VIDIOC_S_FMT, format), "does not take the format");
-    v4l2_streamparm rate{};
-    rate.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-    rate.parm.output.timeperframe = {1000, static_cast<std::uint32_t>(fps * 1000)};
-    check(device_.ask(VIDIOC_S_PARM, rate), "does not take the rate");
-    int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-    check(device_.ask(VIDIOC_STREAMON, type), "does not start");
+  Sensor(const std::string& path, int width, int height, double fps)
+      : path_(path), device_(test::open_loopback(path, width, height, V4L2_PIX_FMT_GREY, fps)) {
     // Steps of grey: something to see, that stands still.
     picture_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
     for (std::size_t i = 0; i < picture_.size(); ++i)
