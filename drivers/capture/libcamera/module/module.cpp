@@ -6,8 +6,8 @@
 /// * stop() of a camera whose device is gone: its buffers do not come back. Such a camera is left as it is, never
 ///   stopped and never destroyed; its memory stays until the process ends;
 /// * a device that comes back: its camera has the id of the one that was. So the manager does not learn of devices that
-///   come or go: udev_monitor_enable_receiving() below takes the place of libudev's. Another manager has to look, once
-///   no camera is open: renew().
+///   come or go: udev_monitor_enable_receiving() and udev_monitor_get_fd() below take the place of libudev's. Another
+///   manager has to look, once no camera is open: renew().
 #include "drivers/capture/libcamera/module.h"
 
 #include <libcamera/camera.h>
@@ -15,6 +15,7 @@
 #include <libcamera/framebuffer_allocator.h>
 #include <libcamera/request.h>
 #include <linux/dma-buf.h>
+#include <sys/eventfd.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 
@@ -610,6 +611,13 @@ extern "C" __attribute__((visibility("default"))) const LibcameraModule* stereot
   return &kTable;
 }
 
-/// libcamera finds this one, not libudev's: a module's own symbols come first for the libraries that it brings.
+/// libcamera finds these, not libudev's: a module's own symbols come first for the libraries that it brings. Debian
+/// 12's libudev hears of nothing before the first; Debian 13's listens from its making on, but nobody waits for what it
+/// hears.
 extern "C" __attribute__((visibility("default"))) int udev_monitor_enable_receiving(void* /*monitor*/);
 extern "C" int udev_monitor_enable_receiving(void* /*monitor*/) { return 0; }
+extern "C" __attribute__((visibility("default"))) int udev_monitor_get_fd(void* /*monitor*/);
+extern "C" int udev_monitor_get_fd(void* /*monitor*/) {
+  static const int silent = ::eventfd(0, EFD_CLOEXEC);
+  return silent;
+}

@@ -50,7 +50,8 @@ gtest() {
         ;;
     esac
   done < <(grep -E '^\[ .* \(.* ms\)$' "$log")
-  if ((code && !failed)); then
+  # 1 says that a test failed; what is more, nobody has told.
+  if ((code > 1 || (code && !failed))); then
     tail -n 20 "$log" | tell
     told "not ok" "$program ends with code $code"
   fi

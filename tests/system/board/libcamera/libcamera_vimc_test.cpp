@@ -26,6 +26,7 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::nanoseconds;
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 
 class Vimc : public ::testing::Test {
  protected:
@@ -69,7 +70,7 @@ class Vimc : public ::testing::Test {
 TEST_F(Vimc, BothAreListedWithWhatTheyOffer) {
   const Listing listing = list_cameras();
   ASSERT_EQ(listing.cameras.size(), 2U) << (listing.problems.empty() ? "" : listing.problems.front());
-  EXPECT_THAT(listing.module, HasSubstr("libcamera v0.0.3, "));
+  EXPECT_THAT(listing.module, MatchesRegex("libcamera v0\\..*, /payload/stereotrack-libcamera-0\\..*\\.so"));
   for (const CameraFacts& camera : listing.cameras) {
     EXPECT_THAT(camera.id, HasSubstr("vimc"));
     const auto rgb = std::find_if(camera.formats.begin(), camera.formats.end(),
@@ -86,9 +87,9 @@ TEST_F(Vimc, WhatCannotBeHadIsALineWithWhatCan) {
   wish.format = "grey8";
   EXPECT_THAT(refusal(wish), HasSubstr("has no format grey8; it has "));
   wish = settings("0");
-  wish.width = 320;  // no multiple of six
-  EXPECT_THAT(refusal(wish),
-              HasSubstr("cannot deliver 320x180 rgb8, libcamera would make 318x180 rgb8 of it; it offers "));
+  wish.width = 321;  // libcamera 0.0.3 wants a multiple of six, later ones an even number
+  EXPECT_THAT(refusal(wish), HasSubstr("cannot deliver 321x180 rgb8, libcamera would make 3"));
+  EXPECT_THAT(refusal(wish), HasSubstr("x180 rgb8 of it; it offers "));
   EXPECT_THAT(refusal(settings("imx219")), HasSubstr("libcamera has none of that name; it knows 0: "));
   const auto first = open(settings("0"));
   EXPECT_THAT(refusal(settings("0")), HasSubstr("another program has it"));
