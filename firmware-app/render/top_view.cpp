@@ -79,10 +79,12 @@ cv::Point2d TopView::place(cv::Size size, double x, double z) const {
 
 void TopView::make_room(const FrameResult& result, cv::Size size) {
   constexpr double kFilled = 0.95;
+  constexpr double kSure_s = 1;  // what has just come into view may be matched anywhere
   const double limit = round_reach(geometry_.f * geometry_.baseline / 2.0 * unit_.per_unit);
   const double aspect = (size.height - kFloor_px) / (size.width / 2.0);
   for (const TrackReport& track : result.tracks) {
     if (track.state != TrackState::kConfirmed || !track.measured || !usable(track)) continue;
+    if (track.age_s < kSure_s) continue;
     const double depth = std::max(track.position.z(), std::abs(track.position.x()) * aspect);
     const double needed = round_reach(depth * unit_.per_unit / kFilled);
     reach_ = std::max(reach_, std::min(needed, limit));

@@ -23,8 +23,8 @@ struct LengthUnit {
 ///
 /// Scale: one for both axes. The depth at the upper edge is one of 1 1.5 2 3 5 7 times a power of ten. It
 /// starts at the first of them over Z of a disparity of a tenth of the picture's width, and grows, never
-/// shrinks, when a confirmed and measured track does not fit, up to Z of 2 px, where depth says nothing any
-/// more. Tracks beyond the edge are drawn on it, hollow.
+/// shrinks, when a confirmed and measured track of a second's age does not fit, up to Z of 2 px, where depth says
+/// nothing any more. Tracks beyond the edge are drawn on it, hollow.
 class TopView {
  public:
   TopView(const RectifiedGeometry& geometry, LengthUnit unit, std::vector<ShownZone> zones = {});

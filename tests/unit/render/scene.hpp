@@ -41,6 +41,7 @@ inline TrackReport track_at(std::uint32_t id, TrackState state, double x, double
   out.state = state;
   out.measured = state != TrackState::kCoasting;
   out.has_depth = true;
+  out.age_s = 2;
   out.position = {x, 0, z};
   out.velocity = {0.5, 0, 0.2};
   out.covariance.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() * 0.01;

@@ -67,6 +67,13 @@ TEST_F(TopViewTest, DoesNotGrowForWhatIsNotBelieved) {
   EXPECT_TRUE(has_dot(pixel(0.4, 1.5, 2), 3));
 }
 
+TEST_F(TopViewTest, DoesNotGrowForWhatHasJustComeIntoView) {
+  TrackReport young = track_at(1, TrackState::kConfirmed, 0, 20);
+  young.age_s = 0.9;
+  draw({young, track_at(3, TrackState::kConfirmed, 0.4, 1.5)});
+  EXPECT_TRUE(has_dot(pixel(0.4, 1.5, 2), 3));
+}
+
 TEST_F(TopViewTest, DoesNotGrowBeyondWhereDisparityEnds) {
   draw({track_at(1, TrackState::kConfirmed, 0, 4000), track_at(2, TrackState::kConfirmed, 4, 15)});
   EXPECT_TRUE(has_dot(pixel(4, 15, 30), 2));
