@@ -31,7 +31,7 @@ const std::vector<std::string> kLatency{"latency.output_ms=40", "latency.missing
 
 bool has(const Pair& pair, telemetry::Flag flag) { return (pair.header.flags & flag) != 0; }
 
-/// Runs until `done`, for three minutes at most: on a busy machine the scene's own cameras are late for pulse after pulse.
+/// Runs until `done`, for three minutes at most: on a busy machine the scene's cameras are late for pulse after pulse.
 template <class Done>
 void run(LiveRig& rig, Done done) {
   const auto begun = std::chrono::steady_clock::now();
