@@ -18,6 +18,7 @@
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/encoder.hpp"
 #include "drivers/telemetry/file_sink.hpp"
+#include "drivers/telemetry/frame_flags.hpp"
 #include "drivers/telemetry/udp_sender.hpp"
 #include "firmware-app/render/renderer.hpp"
 #include "firmware-app/runtime/allocation_count.hpp"
@@ -41,17 +42,6 @@ constexpr std::uint64_t kWarmUpFrames = 10;
 constexpr std::size_t kMostReasons = 100;
 // Identities of a replay: fixed, so that the same file gives the same bytes.
 constexpr std::uint64_t kReplaySession = 1;
-
-std::uint32_t telemetry_flags(std::uint32_t flags, bool skipped_before) {
-  std::uint32_t out = 0;
-  if ((flags & kFlagMono) != 0) out |= telemetry::kMono;
-  if ((flags & kFlagNoColour) != 0) out |= telemetry::kNoColour;
-  if ((flags & kFlagLearning) != 0) out |= telemetry::kBackgroundLearning;
-  if ((flags & kFlagLightChange) != 0) out |= telemetry::kLightChange;
-  if ((flags & kFlagWrongPair) != 0) out |= telemetry::kWrongPair;
-  if (skipped_before) out |= telemetry::kFramesSkippedBefore;
-  return out;
-}
 
 // Holds each pair back until its capture time plus the latency has come, counted from the first pair.
 class Pacer {
@@ -313,7 +303,8 @@ class Replay {
     message.capture_time = pair.capture_time;
     message.send_time = pair.capture_time + latency;
     message.latency = latency;
-    message.flags = telemetry_flags(result.flags, skipped_before_);
+    message.flags = telemetry::flags_of_frame(result.flags);
+    if (skipped_before_) message.flags |= telemetry::kFramesSkippedBefore;
     message.frames_skipped = static_cast<std::uint32_t>(summary_.skipped);
     send(message);
   }

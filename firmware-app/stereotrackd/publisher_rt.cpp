@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "drivers/record/output_note.hpp"
+#include "drivers/telemetry/frame_flags.hpp"
 #include "firmware-app/runtime/allocation_count.hpp"
 #include "pipeline/pipeline.hpp"
 
@@ -19,16 +20,6 @@ constexpr std::chrono::seconds kStatusPeriod{1};
 constexpr std::chrono::milliseconds kStatusRoom{1};  // a status needs no more, and must not delay a slot
 constexpr std::chrono::milliseconds kClockStep{1};   // a map that moves by more than measuring explains
 constexpr std::uint64_t kWarmUpOutputs = 10;
-
-std::uint32_t wire_flags(std::uint32_t flags) noexcept {
-  std::uint32_t out = 0;
-  if ((flags & kFlagMono) != 0) out |= telemetry::kMono;
-  if ((flags & kFlagNoColour) != 0) out |= telemetry::kNoColour;
-  if ((flags & kFlagLearning) != 0) out |= telemetry::kBackgroundLearning;
-  if ((flags & kFlagLightChange) != 0) out |= telemetry::kLightChange;
-  if ((flags & kFlagWrongPair) != 0) out |= telemetry::kWrongPair;
-  return out;
-}
 
 std::uint32_t to_us(std::uint64_t ns) noexcept {
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(ns / 1000, std::numeric_limits<std::uint32_t>::max()));
@@ -240,7 +231,7 @@ void Publisher::publish(const Output& output) noexcept {
   if (const capture::PairNotice* notice = notice_of(output)) message.capture_time = notice->capture_time;
   message.send_time = message.capture_time + (output.due - output.captured);
   message.latency = output.due - output.captured;
-  message.flags = wire_flags(leaving_.flags) | telemetry::kStateAtOutput;
+  message.flags = telemetry::flags_of_frame(leaving_.flags) | telemetry::kStateAtOutput;
   if (output.kind == OutputSchedule::Kind::kMissing) message.flags |= telemetry::kPairMissing;
   if (output.kind == OutputSchedule::Kind::kPredicted) message.flags |= telemetry::kPredicted;
   if (output.after_due) message.flags |= telemetry::kLate;
