@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "pipeline/core/square.hpp"
 #include "pipeline/geometry/triangulate.hpp"
 #include "pipeline/shape/region.hpp"
 #include "pipeline/stereo/disparity.hpp"
@@ -35,8 +36,6 @@ constexpr double kRareColour = 0.02;
 // A region's disparity is never known better than this, whatever the number of pixels: errors of neighbours go
 // together, and calibration adds its own.
 constexpr double kLeastDisparitySd = 0.10;
-
-double square(double value) noexcept { return value * value; }
 
 double length(double x, double y) noexcept { return std::sqrt(x * x + y * y); }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/core/bounded_vector.hpp"
+#include "pipeline/core/square.hpp"
 
 namespace stereotrack {
 
@@ -18,8 +19,6 @@ constexpr double kLeastOverlap = 0.5;
 constexpr double kBelievedFor_s = 0.5;
 constexpr double kPeriodGrowth = 1.01;  // a frame: a rate that was lowered is followed within a second or two
 constexpr std::size_t kMostWitnesses = 64;
-
-double square(double value) noexcept { return value * value; }
 
 struct Witness {
   double residual;  // [px]

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/core/square.hpp"
 #include "pipeline/shape/region.hpp"
 
 namespace stereotrack {
@@ -74,8 +75,6 @@ constexpr double kMostLooksRate = 0.3;
 constexpr double kItself = 0.6;  // part of the looks that must be known already
 // A target that comes straight on hardly moves in the picture: this change of distance shows it.
 constexpr double kApproachPart = 0.05;
-
-double square(double value) noexcept { return value * value; }
 
 Matrix2 centre_noise(const Tracker::Config& config, const Rect& box) noexcept {
   Matrix2 R = Matrix2::Zero();
