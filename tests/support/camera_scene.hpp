@@ -121,7 +121,10 @@ class CameraScene {
         continue;
       }
       told.tell(pulse);
-      show(scene, first, i++, pulse.time.time_since_epoch() + kDelay + kLeftExposure / 2, !misses_.exchange(false));
+      // A frame comes once its exposure is over: none whose time is still to come leaves on time ("camera_ahead").
+      const auto begun = pulse.time.time_since_epoch() + kDelay;
+      std::this_thread::sleep_until(std::chrono::steady_clock::time_point(begun + kLeftExposure));
+      show(scene, first, i++, begun + kLeftExposure / 2, !misses_.exchange(false));
     }
   }
 
