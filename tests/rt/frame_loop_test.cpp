@@ -109,7 +109,6 @@ TEST_P(FrameLoop, ThousandFramesWithoutHeapCallAndWithFlatMemory) {
   const std::size_t arena_bytes = loop.arena().bytes_used();
   const MemoryUse planned = loop.pipeline().memory();
   loop.run(kWarmUp);
-  (void)ProcessMemory::now();  // what looking itself leaves in malloc's caches
   const ProcessMemory before = ProcessMemory::now();
   loop.run(MovingScene::kFrames - kWarmUp);
   const ProcessMemory after = ProcessMemory::now();

@@ -1,11 +1,15 @@
 #pragma once
 
+#include <fcntl.h>
 #include <malloc.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
-#include <fstream>
-#include <string>
+#include <string_view>
 
 #include "firmware-app/runtime/allocation_count.hpp"
 
@@ -28,13 +32,22 @@ struct ProcessMemory {
   std::size_t heap = 0;       ///< in use, as malloc itself counts, mapped blocks included [bytes]
   std::size_t anonymous = 0;  ///< resident pages that are no file's: heap, stacks, data [bytes]
 
-  [[nodiscard]] static ProcessMemory now() {
+  /// Without a heap call of its own: what looking leaves in malloc's caches would count as in use.
+  [[nodiscard]] static ProcessMemory now() noexcept {
     ProcessMemory memory;
-    std::ifstream lines("/proc/self/smaps_rollup");
-    for (std::string line; std::getline(lines, line);) {
-      if (line.starts_with("Anonymous:")) memory.anonymous = 1024 * std::stoul(line.substr(line.find(':') + 1));
+    std::array<char, 4096> text{};
+    const int file = ::open("/proc/self/smaps_rollup", O_RDONLY | O_CLOEXEC);
+    std::size_t size = 0;
+    for (ssize_t read = 1; read > 0 && size < text.size(); size += static_cast<std::size_t>(std::max<ssize_t>(read, 0)))
+      read = ::read(file, text.data() + size, text.size() - size);
+    (void)::close(file);
+    constexpr std::string_view kKey = "\nAnonymous:";
+    const std::string_view all(text.data(), size);
+    if (const std::size_t at = all.find(kKey); at != std::string_view::npos) {
+      const std::size_t number = all.find_first_not_of(' ', at + kKey.size());
+      (void)std::from_chars(text.data() + number, text.data() + size, memory.anonymous);
+      memory.anonymous *= 1024;
     }
-    lines.close();
     const struct mallinfo2 heap = mallinfo2();
     memory.heap = heap.uordblks + heap.hblkhd;
     return memory;
