@@ -19,7 +19,7 @@ constexpr int kHeight = 4;
 /// Pairs of one grey level each; level 0: cannot be read.
 class Levels final : public FrameSource {
  public:
-  explicit Levels(std::vector<std::uint8_t> levels, milliseconds period = milliseconds(1))
+  explicit Levels(std::vector<std::uint8_t> levels, milliseconds period = milliseconds(20))
       : levels_(std::move(levels)) {
     info_.name = "levels";
     info_.width = kWidth;
@@ -77,36 +77,39 @@ Show play(Film& film, std::size_t pairs) {
   return show;
 }
 
-std::vector<int> levels_of(const Show& show) {
-  std::vector<int> levels;
-  for (const Seen& seen : show.seen) levels.push_back(seen.level);
-  return levels;
+/// Each by its ordinal: where this machine was kept from running, pairs are passed over.
+void expect_levels(const Show& show, const std::vector<int>& cycle) {
+  ASSERT_FALSE(show.seen.empty());
+  for (const Seen& seen : show.seen) {
+    EXPECT_EQ(seen.level, cycle[(seen.ordinal - 1) % cycle.size()]) << seen.ordinal;
+  }
 }
 
 TEST(Film, OncePlaysEachPairAndEnds) {
   Levels source({1, 2, 3});
   Film film(source, {.repeat = Film::Repeat::kOnce});
   const Show show = play(film, 10);
-  EXPECT_EQ(levels_of(show), (std::vector<int>{1, 2, 3}));
+  expect_levels(show, {1, 2, 3});
+  EXPECT_LE(show.seen.back().ordinal, 3U);
   EXPECT_EQ(show.last, LiveSource::Step::kEnded);
 }
 
 TEST(Film, BounceGoesBackWithoutShowingAnEndTwice) {
   Levels source({1, 2, 3});
   Film film(source, {.repeat = Film::Repeat::kBounce});
-  EXPECT_EQ(levels_of(play(film, 8)), (std::vector<int>{1, 2, 3, 2, 1, 2, 3, 2}));
+  expect_levels(play(film, 8), {1, 2, 3, 2});
 }
 
 TEST(Film, LoopBeginsAnew) {
   Levels source({1, 2, 3});
   Film film(source, {.repeat = Film::Repeat::kLoop});
-  EXPECT_EQ(levels_of(play(film, 7)), (std::vector<int>{1, 2, 3, 1, 2, 3, 1}));
+  expect_levels(play(film, 7), {1, 2, 3});
 }
 
 TEST(Film, OnePairAloneIsShownForEver) {
   Levels source({9});
   Film film(source, {.repeat = Film::Repeat::kBounce});
-  EXPECT_EQ(levels_of(play(film, 3)), (std::vector<int>{9, 9, 9}));
+  expect_levels(play(film, 3), {9});
 }
 
 TEST(Film, OrdinalsAndTimesRiseByThePeriodWhicheverWayItIsPlayed) {
@@ -114,7 +117,7 @@ TEST(Film, OrdinalsAndTimesRiseByThePeriodWhicheverWayItIsPlayed) {
   Film film(source, {.repeat = Film::Repeat::kBounce});
   const Show show = play(film, 9);
   for (std::size_t i = 1; i < show.seen.size(); ++i) {
-    // Whole periods apart: where this machine was kept from running, pairs are passed over, never shown late.
+    // Whole periods apart: a pair is passed over, never shown late.
     const std::uint64_t steps = show.seen[i].ordinal - show.seen[i - 1].ordinal;
     EXPECT_GE(steps, 1U);
     EXPECT_EQ(show.seen[i].time - show.seen[i - 1].time, milliseconds(2) * static_cast<std::int64_t>(steps));
@@ -123,11 +126,14 @@ TEST(Film, OrdinalsAndTimesRiseByThePeriodWhicheverWayItIsPlayed) {
 
 TEST(Film, WhatCouldNotBeReadLeavesAGap) {
   Levels source({1, 0, 3});
-  Film film(source, {.repeat = Film::Repeat::kOnce});
-  const Show show = play(film, 10);
-  ASSERT_EQ(levels_of(show), (std::vector<int>{1, 3}));
-  EXPECT_EQ(show.seen[1].ordinal, 3U);
-  EXPECT_EQ(show.seen[1].time - show.seen[0].time, milliseconds(2));
+  Film film(source, {.repeat = Film::Repeat::kLoop});
+  const Show show = play(film, 6);
+  expect_levels(show, {1, 0, 3});
+  for (const Seen& seen : show.seen) {
+    EXPECT_NE(seen.ordinal % 3, 2U);
+    EXPECT_EQ(seen.time - show.seen[0].time,
+              milliseconds(20) * static_cast<std::int64_t>(seen.ordinal - show.seen[0].ordinal));
+  }
 }
 
 TEST(Film, StepReturnsAtItsDeadlineWhenNoPairIsDue) {
