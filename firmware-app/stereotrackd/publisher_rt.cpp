@@ -302,7 +302,7 @@ void Publisher::judge_health() noexcept {
   const auto tell_if = [&health](bool wrong, telemetry::Health bit) {
     if (wrong) health |= bit;
   };
-  tell_if(schedule_.status_only(), telemetry::kHealthNoPairs);
+  tell_if(schedule_.status_only() || pairs_are_not_believed(), telemetry::kHealthNoPairs);
   cameras_ = source_.figures();
   tell_if(cameras_.cameras[0].silent, telemetry::kHealthLeftSilent);
   tell_if(cameras_.cameras[1].silent, telemetry::kHealthRightSilent);
@@ -330,6 +330,16 @@ void Publisher::judge_health() noexcept {
   lines_failed_seen_ = lines_failed;
   health_ = health;
   vitals_.health.set(health);
+}
+
+/// Pairs came since the last time, and none with a time that can be: each slot left as missing.
+bool Publisher::pairs_are_not_believed() noexcept {
+  const OutputSchedule::Counters& outputs = schedule_.counters();
+  const std::uint64_t refused = outputs.from_future + outputs.from_past;
+  const std::uint64_t had_a_slot = outputs.on_time + outputs.predicted_late + outputs.predicted_superseded;
+  const bool some_were_refused = std::exchange(refused_seen_, refused) != refused;
+  const bool none_had_a_slot = std::exchange(had_a_slot_seen_, had_a_slot) == had_a_slot;
+  return some_were_refused && none_had_a_slot;
 }
 
 /// Pulses of ours that were not given since the last time.

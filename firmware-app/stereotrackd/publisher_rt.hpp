@@ -108,6 +108,7 @@ class Publisher {
   void send_status(MonotonicTime now) noexcept;
   void judge_health() noexcept;
   [[nodiscard]] bool trigger_fails() noexcept;
+  [[nodiscard]] bool pairs_are_not_believed() noexcept;
   void drive(gpio::LineBits lines, MonotonicTime now) noexcept;
   void tell() noexcept;
   [[nodiscard]] telemetry::Live live_of(const Output* output) const noexcept;
@@ -149,6 +150,8 @@ class Publisher {
   std::optional<std::chrono::nanoseconds> send_error_;
   std::uint32_t health_ = 0;
   std::uint64_t misses_seen_ = 0;  ///< at the last judgement
+  std::uint64_t refused_seen_ = 0;
+  std::uint64_t had_a_slot_seen_ = 0;
   std::uint64_t drops_seen_ = 0;
   std::uint64_t unused_told_ = 0;
   std::uint64_t recordings_seen_ = 0;

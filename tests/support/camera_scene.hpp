@@ -64,6 +64,8 @@ class CameraScene {
   }
   void plug_in(Side side) { sensor(side).refuse(""); }
   void set_skew(std::chrono::nanoseconds skew) { skew_ns_.store(skew.count()); }
+  /// Frames bear times that much later than when they are exposed.
+  void set_ahead(std::chrono::nanoseconds ahead) { ahead_ns_.store(ahead.count()); }
   void set_right_exposure(std::chrono::nanoseconds exposure) { right_exposure_ns_.store(exposure.count()); }
   static constexpr std::chrono::nanoseconds kDelay = std::chrono::microseconds(300);
   static constexpr std::chrono::nanoseconds kLeftExposure = std::chrono::milliseconds(4);
@@ -130,6 +132,7 @@ class CameraScene {
 
   /// The i-th exposure, from 1, whose middle is at `time`.
   void show(MovingScene& scene, int first, int i, std::chrono::nanoseconds time, bool with_right) {
+    time += std::chrono::nanoseconds(ahead_ns_.load());
     const int frame = (first + i - 2) % MovingScene::kFrames + 1;
     const FramePair pair = scene.pair(frame, true);
     const auto number = static_cast<std::uint64_t>(i);
@@ -158,6 +161,7 @@ class CameraScene {
   SensorScript right_;
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> skew_ns_{0};
+  std::atomic<std::int64_t> ahead_ns_{0};
   std::atomic<std::int64_t> right_exposure_ns_{kLeftExposure.count()};
   std::atomic<bool> misses_{false};
   std::array<std::atomic<bool>, 2> unwired_{};

@@ -200,6 +200,33 @@ TEST(CamerasDaemon, SkewAndExposuresBeyondTheirLimitsAreAlarms) {
   EXPECT_GT(rig.daemon->vitals().exposures_differ.get(), 0U);
 }
 
+TEST(CamerasDaemon, PairsWhoseTimesAreStillToComeAreAnAlarm) {
+  CameraScene scene(kSceneFormats[0], kPeriod);
+  LiveRig rig(scene.open(20), kLatency);
+  // The first messages settle the cadence, which goes on without pairs.
+  int stage = 0;
+  run(rig, [&] {
+    if (rig.ear.pairs().empty() || rig.ear.statuses().empty()) return false;
+    const bool is_told = (rig.ear.statuses().back().health & telemetry::kHealthNoPairs) != 0;
+    switch (stage) {
+      case 0:
+        if (rig.ear.pairs().size() < 50 || is_told) break;
+        scene.set_ahead(milliseconds(200));
+        ++stage;
+        break;
+      case 1:
+        if (!is_told || !has(rig.ear.pairs().back(), telemetry::kPairMissing)) break;
+        scene.set_ahead(milliseconds(0));
+        ++stage;
+        break;
+      default: return !is_told && rig.ear.pairs().back().header.ordinal != 0;
+    }
+    return false;
+  });
+  EXPECT_EQ(stage, 2);
+  EXPECT_TRUE(said(rig, "camera_ahead", "left"));
+}
+
 std::unique_ptr<trigger::PulseTrain> train_on(const std::string& line) {
   const gpio::LineSpec spec{.name = {"sim", line}};
   auto train = trigger::PulseTrain::create({.period = kPeriod, .width = milliseconds(1), .late = milliseconds(5)},
