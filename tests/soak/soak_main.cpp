@@ -339,7 +339,14 @@ class Soak {
     const auto passed_over = [this] { return daemon_->pool().skipped + daemon_->pool().evicted; };
     const auto& box_counters = box().counters();
     faults_ = {
-        {"pairs lost", "missing, overslept_missing", [this] { source_->lose(random_.upto(1, 3)); }, gaps},
+        // Amid an outage of pairs there is no slot to be missing, or to be slept over.
+        {"pairs lost",
+         "missing, overslept_missing",
+         [this] { source_->lose(random_.upto(1, 3)); },
+         gaps,
+         milliseconds(4'000),
+         {},
+         true},
         {"pair twice", "notices_out_of_order", [this] { source_->repeat(1); },
          [this] { return schedule("notices_out_of_order"); }},
         {"capture stands still", "outages",
@@ -358,7 +365,6 @@ class Soak {
          [this] { slow_.demand(1, any_stage(), kPeriod * random_.upto(8, 16)); }, passed_over, milliseconds(10'000)},
         {"result too late", "predicted_late", [this] { slow_.demand(1, any_stage(), milliseconds(100)); },
          [this] { return schedule("predicted_late"); }, milliseconds(5'000)},
-        // Amid an outage of pairs there is no slot to be slept over.
         {"process suspended",
          "overslept_pairs, overslept_missing",
          [this] { keeper_.suspend(milliseconds(random_.upto(150, 600))); },
