@@ -302,7 +302,8 @@ void Publisher::judge_health() noexcept {
   const auto tell_if = [&health](bool wrong, telemetry::Health bit) {
     if (wrong) health |= bit;
   };
-  tell_if(schedule_.status_only() || pairs_are_not_believed(), telemetry::kHealthNoPairs);
+  tell_if(schedule_.status_only(), telemetry::kHealthNoPairs);
+  tell_if(pairs_are_not_believed(), telemetry::kHealthNoPairs);
   cameras_ = source_.figures();
   tell_if(cameras_.cameras[0].silent, telemetry::kHealthLeftSilent);
   tell_if(cameras_.cameras[1].silent, telemetry::kHealthRightSilent);

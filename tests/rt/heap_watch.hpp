@@ -37,9 +37,7 @@ struct ProcessMemory {
     ProcessMemory memory;
     std::array<char, 4096> text{};
     const int file = ::open("/proc/self/smaps_rollup", O_RDONLY | O_CLOEXEC);
-    std::size_t size = 0;
-    for (ssize_t read = 1; read > 0 && size < text.size(); size += static_cast<std::size_t>(std::max<ssize_t>(read, 0)))
-      read = ::read(file, text.data() + size, text.size() - size);
+    const auto size = static_cast<std::size_t>(std::max<ssize_t>(::read(file, text.data(), text.size()), 0));
     (void)::close(file);
     constexpr std::string_view kKey = "\nAnonymous:";
     const std::string_view all(text.data(), size);

@@ -56,6 +56,7 @@ struct Seen {
 struct Show {
   std::vector<Seen> seen;
   LiveSource::Step last = LiveSource::Step::kGoing;
+  bool disturbed = false;  ///< this machine was kept from running, so that pairs may have been passed over
 };
 Show play(Film& film, std::size_t pairs) {
   FramePool pool(4);
@@ -63,8 +64,11 @@ Show play(Film& film, std::size_t pairs) {
   Doorbell bell;
   PairOutlet outlet(pool, notices, bell);
   Show show;
+  auto due = std::chrono::steady_clock::now();
   while (show.seen.size() < pairs && show.last == LiveSource::Step::kGoing) {
     show.last = film.step(outlet, MonotonicTime::max());
+    show.disturbed = show.disturbed || std::chrono::steady_clock::now() - due > 2 * film.info().period;
+    due += film.info().period;
     if (const PairLease lease = pool.take_oldest()) {
       show.seen.push_back({lease->ordinal, lease->left.row(kHeight - 1)[kWidth - 1], lease->capture_time});
       PairNotice notice;
@@ -77,39 +81,43 @@ Show play(Film& film, std::size_t pairs) {
   return show;
 }
 
-/// Each by its ordinal: where this machine was kept from running, pairs are passed over.
-void expect_levels(const Show& show, const std::vector<int>& cycle) {
-  ASSERT_FALSE(show.seen.empty());
-  for (const Seen& seen : show.seen) {
-    EXPECT_EQ(seen.level, cycle[(seen.ordinal - 1) % cycle.size()]) << seen.ordinal;
+/// The same of a new film, until nothing has disturbed it.
+Show play_undisturbed(const std::vector<std::uint8_t>& levels, Film::Repeat repeat, std::size_t pairs) {
+  for (int i = 0; i < 100; ++i) {
+    Levels source(levels);
+    Film film(source, {.repeat = repeat});
+    Show show = play(film, pairs);
+    if (!show.disturbed) return show;
   }
+  ADD_FAILURE() << "this machine never ran for as long as the film";
+  return {};
+}
+
+std::vector<int> levels_of(const Show& show) {
+  std::vector<int> levels;
+  for (const Seen& seen : show.seen) levels.push_back(seen.level);
+  return levels;
 }
 
 TEST(Film, OncePlaysEachPairAndEnds) {
-  Levels source({1, 2, 3});
-  Film film(source, {.repeat = Film::Repeat::kOnce});
-  const Show show = play(film, 10);
-  expect_levels(show, {1, 2, 3});
-  EXPECT_LE(show.seen.back().ordinal, 3U);
+  const Show show = play_undisturbed({1, 2, 3}, Film::Repeat::kOnce, 10);
+  EXPECT_EQ(levels_of(show), (std::vector<int>{1, 2, 3}));
   EXPECT_EQ(show.last, LiveSource::Step::kEnded);
 }
 
 TEST(Film, BounceGoesBackWithoutShowingAnEndTwice) {
-  Levels source({1, 2, 3});
-  Film film(source, {.repeat = Film::Repeat::kBounce});
-  expect_levels(play(film, 8), {1, 2, 3, 2});
+  const Show show = play_undisturbed({1, 2, 3}, Film::Repeat::kBounce, 8);
+  EXPECT_EQ(levels_of(show), (std::vector<int>{1, 2, 3, 2, 1, 2, 3, 2}));
 }
 
 TEST(Film, LoopBeginsAnew) {
-  Levels source({1, 2, 3});
-  Film film(source, {.repeat = Film::Repeat::kLoop});
-  expect_levels(play(film, 7), {1, 2, 3});
+  const Show show = play_undisturbed({1, 2, 3}, Film::Repeat::kLoop, 7);
+  EXPECT_EQ(levels_of(show), (std::vector<int>{1, 2, 3, 1, 2, 3, 1}));
 }
 
 TEST(Film, OnePairAloneIsShownForEver) {
-  Levels source({9});
-  Film film(source, {.repeat = Film::Repeat::kBounce});
-  expect_levels(play(film, 3), {9});
+  const Show show = play_undisturbed({9}, Film::Repeat::kBounce, 3);
+  EXPECT_EQ(levels_of(show), (std::vector<int>{9, 9, 9}));
 }
 
 TEST(Film, OrdinalsAndTimesRiseByThePeriodWhicheverWayItIsPlayed) {
@@ -125,15 +133,10 @@ TEST(Film, OrdinalsAndTimesRiseByThePeriodWhicheverWayItIsPlayed) {
 }
 
 TEST(Film, WhatCouldNotBeReadLeavesAGap) {
-  Levels source({1, 0, 3});
-  Film film(source, {.repeat = Film::Repeat::kLoop});
-  const Show show = play(film, 6);
-  expect_levels(show, {1, 0, 3});
-  for (const Seen& seen : show.seen) {
-    EXPECT_NE(seen.ordinal % 3, 2U);
-    EXPECT_EQ(seen.time - show.seen[0].time,
-              milliseconds(20) * static_cast<std::int64_t>(seen.ordinal - show.seen[0].ordinal));
-  }
+  const Show show = play_undisturbed({1, 0, 3}, Film::Repeat::kOnce, 10);
+  ASSERT_EQ(levels_of(show), (std::vector<int>{1, 3}));
+  EXPECT_EQ(show.seen[1].ordinal, 3U);
+  EXPECT_EQ(show.seen[1].time - show.seen[0].time, milliseconds(40));
 }
 
 TEST(Film, StepReturnsAtItsDeadlineWhenNoPairIsDue) {
