@@ -57,6 +57,7 @@ struct CameraConfig {
   double exposure_us = 0;             ///< [us]; 0: automatic
   double gain = 0;                    ///< 1 = none; 0: automatic
   int black_level = -1;               ///< in the driver's own unit; -1: as the driver has it
+  int control_delay_frames = 2;       ///< from a change of a control to the first frame exposed with it; V4L2 alone
   double readout_us = 0;              ///< [us]; 0: as the driver tells
   double timeout_ms = 500;            ///< [ms]
   double tolerance = 0.25;            ///< of the period

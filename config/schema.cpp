@@ -92,6 +92,9 @@ std::vector<Key> keys_of(Configuration& c) {
       key("camera.gain", c.camera.gain, 0, 1000, "", "Gain of both, 1 is none; 0: automatic, each by itself."),
       key("camera.black_level", c.camera.black_level, -1, 65535, "",
           "Black level of both in the driver's own unit; -1: as the driver has it. Not with libcamera."),
+      key("camera.control_delay_frames", c.camera.control_delay_frames, 1, 8, "frames",
+          "From a change of exposure or gain to the first frame that was exposed with it, as the sensor's data sheet "
+          "has it: what each pair is told to be exposed with. V4L2 alone; libcamera tells it of each frame."),
       key("camera.readout_us", c.camera.readout_us, 0, 1e7, "us",
           "From the end of an exposure to the end of its frame, where the driver stamps the latter; 0: as it tells."),
       key("camera.timeout_ms", c.camera.timeout_ms, 10, 60000, "ms",

@@ -66,6 +66,7 @@ capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, Side s
     settings.memory = camera.heap.empty() ? capture::v4l2::Memory::kExported : capture::v4l2::Memory::kImported;
   }
   if (camera.black_level >= 0) settings.black_level = camera.black_level;
+  settings.control_delay_frames = camera.control_delay_frames;
   return settings;
 }
 

@@ -24,7 +24,7 @@ TEST(RealModule, LoadsAndTellsOfItsCamerasOrThatThereAreNone) {
   setenv("STEREOTRACK_MODULE_PATH", std::filesystem::path(REAL_MODULE).parent_path().c_str(), 1);
   const Listing listing = list_cameras();
   ASSERT_FALSE(listing.module.empty()) << listing.problems.front();
-  EXPECT_THAT(listing.module, HasSubstr(std::string("libcamera v") + LIBCAMERA_BUILT_AGAINST));
+  EXPECT_THAT(listing.module, HasSubstr("libcamera v" LIBCAMERA_BUILT_AGAINST));
   EXPECT_THAT(listing.module, HasSubstr(REAL_MODULE));
   EXPECT_EQ(listing.cameras.empty(), !listing.problems.empty());
 

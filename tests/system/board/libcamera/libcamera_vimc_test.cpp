@@ -28,13 +28,18 @@ using std::chrono::nanoseconds;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 
+// Small: vimc computes each of its pixels, in libcamera 0.4 nine times as many for one size as in 0.0.3. On Debian 13's
+// emulated CPU a picture of 318x180 takes 2.2 s, more than the four periods in which a frame's clock is to be told.
+constexpr int kWidth = 102;
+constexpr int kHeight = 60;
+
 class Vimc : public ::testing::Test {
  protected:
   static Settings settings(const char* device) {
     Settings wish;
     wish.device = device;
-    wish.width = 318;
-    wish.height = 180;
+    wish.width = kWidth;
+    wish.height = kHeight;
     wish.format = "rgb8";
     wish.fps = 30;
     return wish;
@@ -87,9 +92,9 @@ TEST_F(Vimc, WhatCannotBeHadIsALineWithWhatCan) {
   wish.format = "grey8";
   EXPECT_THAT(refusal(wish), HasSubstr("has no format grey8; it has "));
   wish = settings("0");
-  wish.width = 321;  // libcamera 0.0.3 wants a multiple of six, later ones an even number
-  EXPECT_THAT(refusal(wish), HasSubstr("cannot deliver 321x180 rgb8, libcamera would make 3"));
-  EXPECT_THAT(refusal(wish), HasSubstr("x180 rgb8 of it; it offers "));
+  wish.width = kWidth + 3;  // libcamera 0.0.3 wants a multiple of six, later ones an even number
+  EXPECT_THAT(refusal(wish), HasSubstr("cannot deliver 105x60 rgb8, libcamera would make 10"));
+  EXPECT_THAT(refusal(wish), HasSubstr("x60 rgb8 of it; it offers "));
   EXPECT_THAT(refusal(settings("imx219")), HasSubstr("libcamera has none of that name; it knows 0: "));
   const auto first = open(settings("0"));
   EXPECT_THAT(refusal(settings("0")), HasSubstr("another program has it"));
@@ -103,7 +108,7 @@ TEST_F(Vimc, BothGiveFramesInOneProcessOnTheMonotonicClockWithoutTheHeap) {
   for (const std::string& note : notes) std::cout << "# " << note << '\n';
   for (const auto& camera : cameras) {
     EXPECT_EQ(camera->info().format, PixelFormat::kRgb8);
-    EXPECT_EQ(camera->info().width, 318);
+    EXPECT_EQ(camera->info().width, kWidth);
     EXPECT_GE(camera->info().buffers, 2U);
   }
   constexpr int kFrames = 60;
