@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "config/error.hpp"
+#include "drivers/capture/synthetic/synthetic_source.hpp"
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/endpoint.hpp"
 #include "drivers/telemetry/replay_guard.hpp"
@@ -30,6 +31,37 @@ void add_rig_options(CLI::App& command, stereotrack::RigArguments& rig) {
   command.add_option("--calibration", rig.calibration, "calibration file; else that of the source's folder");
   command.add_option("--config", rig.config, "configuration (TOML); else stereotrack.toml of the source's folder");
   command.add_option("--set", rig.set, "KEY=VALUE, wins over the file; may be given again")->allow_extra_args(false);
+}
+
+void add_synth_options(CLI::App& command, stereotrack::SynthArguments& arguments) {
+  command.add_option("scene", arguments.scene, "name of the scene: " + stereotrack::capture::synthetic::scene_names())
+      ->required();
+  command.add_option("--out", arguments.out, "folder for left/ right/ masks/ disparity/ calibration.yml gt.csv")
+      ->required();
+  command.add_option("--seed", arguments.seed, "another seed, another drawing of the scene")->capture_default_str();
+  command.add_option("--frames", arguments.frames, "how many pairs")->capture_default_str();
+  command.add_option("--size", arguments.size, "WIDTHxHEIGHT of a picture")->capture_default_str();
+}
+
+void add_doctor_options(CLI::App& command, stereotrack::DoctorArguments& arguments) {
+  CLI::Option* config =
+      command.add_option("--config", arguments.config, "checks its cameras, lines and rights; else what there is");
+  CLI::Option* measure =
+      command.add_flag("!--no-measure", arguments.measure, "only looks: opens no camera but to check");
+  command.add_option("--seconds", arguments.seconds, "of each measurement")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str()
+      ->excludes(measure);
+  command
+      .add_option("--line", arguments.line,
+                  "CHIP:LINE: sets this output to and fro and tells how long that takes; no line is touched unasked")
+      ->excludes(measure);
+  command.add_flag("--json", arguments.json, "one JSON object, keys as in docs/DOCTOR.md");
+  command.add_option("--write", arguments.write, "writes a configuration for this board to a new file")
+      ->excludes(config);
+  command.add_option("--calibration", arguments.calibration, "calibration of the two cameras, for that configuration")
+      ->excludes(config);
+  command.footer("Exit code: 0 ready, 1 works with limits, which are named, 2 cannot run.");
 }
 
 // Kernels use the best instruction set of the machine unless one is named; results are the same with each.
@@ -77,7 +109,7 @@ int run(int argc, char** argv) {
 
   stereotrack::SynthArguments synth;
   CLI::App* synth_command = app.add_subcommand("synth", "writes a synthetic stereo sequence with ground truth");
-  stereotrack::add_options(*synth_command, synth);
+  add_synth_options(*synth_command, synth);
 
   stereotrack::EvalArguments eval;
   CLI::App* eval_command = app.add_subcommand(
@@ -121,7 +153,7 @@ int run(int argc, char** argv) {
   stereotrack::DoctorArguments doctor;
   CLI::App* doctor_command =
       app.add_subcommand("doctor", "tells what this board has and can keep, and suggests a configuration");
-  stereotrack::add_options(*doctor_command, doctor);
+  add_doctor_options(*doctor_command, doctor);
 
   try {
     app.parse(argc, argv);

@@ -1,6 +1,5 @@
 #include "firmware-app/stereotrack/synth.hpp"
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -160,15 +159,6 @@ void remove_later_ones(const fs::path& out, std::uint64_t last) {
 }
 
 }  // namespace
-
-void add_options(CLI::App& command, SynthArguments& arguments) {
-  command.add_option("scene", arguments.scene, "name of the scene: " + capture::synthetic::scene_names())->required();
-  command.add_option("--out", arguments.out, "folder for left/ right/ masks/ disparity/ calibration.yml gt.csv")
-      ->required();
-  command.add_option("--seed", arguments.seed, "another seed, another drawing of the scene")->capture_default_str();
-  command.add_option("--frames", arguments.frames, "how many pairs")->capture_default_str();
-  command.add_option("--size", arguments.size, "WIDTHxHEIGHT of a picture")->capture_default_str();
-}
 
 int run_synth(const SynthArguments& arguments, std::ostream& messages) {
   constexpr std::string_view kPrefix = "synthetic:";

@@ -5,10 +5,6 @@
 #include <iosfwd>
 #include <string>
 
-namespace CLI {
-class App;
-}
-
 namespace stereotrack {
 
 /// `stereotrack synth SCENE --out DIR [--seed N] [--frames N] [--size WxH]`
@@ -19,9 +15,6 @@ struct SynthArguments {
   std::uint64_t frames = 600;
   std::string size = "640x480";
 };
-
-/// Declares the arguments above.
-void add_options(CLI::App& command, SynthArguments& arguments);
 
 /// Writes into `out`
 ///     left/%06d.png right/%06d.png   8-bit colour

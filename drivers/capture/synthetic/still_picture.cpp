@@ -71,6 +71,56 @@ Vec3 sky_colour(const Scene& scene, Vec3 direction) noexcept {
   return mix(clear, {0.80, 0.81, 0.83}, 0.65 * smoothstep(-0.1, 0.5, cloud));
 }
 
+/// What stands between points and one place on the sun's disc. Seen from there each shape lies within a circle: few
+/// are left to be met by a ray, and those are the same ones.
+class Sunlight {
+ public:
+  /// `shaders`: of the scene's statics; outlives this, as the scene does.
+  Sunlight(const Scene& scene, std::span<const std::size_t> shaders, Vec3 toward)
+      : scene_(scene),
+        shaders_(shaders),
+        toward_(toward),
+        right_(normalized({toward.z, 0, -toward.x})),
+        up_{toward.y * right_.z, toward.z * right_.x - toward.x * right_.z, -toward.y * right_.x} {
+    constexpr double kRounding = 1e-6;  // [m], far more than the sums below lose
+    for (const std::size_t i : shaders) {
+      const Shape& shape = scene.statics[i];
+      const double radius = shape.bounding_radius + kRounding;
+      circles_.push_back({dot(right_, shape.center), dot(up_, shape.center), radius * radius});
+    }
+  }
+
+  [[nodiscard]] Vec3 toward() const noexcept { return toward_; }
+
+  /// `last`: index in shaders of what hid the sun from a neighbour, which is likely to hide it again; kept.
+  [[nodiscard]] bool is_hidden(Vec3 from, std::size_t& last) const noexcept {
+    if (last < shaders_.size() && blocks(scene_.statics[shaders_[last]], from, toward_)) return true;
+    const double u = dot(right_, from);
+    const double v = dot(up_, from);
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
+      const Circle& circle = circles_[i];
+      const double du = circle.u - u;
+      const double dv = circle.v - v;
+      if (du * du + dv * dv > circle.radius2 || !blocks(scene_.statics[shaders_[i]], from, toward_)) continue;
+      last = i;
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  struct Circle {
+    double u, v, radius2;
+  };
+
+  const Scene& scene_;
+  std::span<const std::size_t> shaders_;
+  Vec3 toward_;
+  Vec3 right_;  // across the way to the sun
+  Vec3 up_;
+  std::vector<Circle> circles_;
+};
+
 /// Rows from `first` up to `last`.
 struct Rows {
   int first = 0;
@@ -87,8 +137,6 @@ void cast_rows(const Scene& scene, const PinholeCamera& camera, StillRays rays, 
   };
   const double weight = 1.0 / (rays == StillRays::kThirteen ? static_cast<double>(kStillOffsets.size()) : 5.0);
   constexpr int kTile = 16;
-  std::array<Vec3, kStillOffsets.size()> sun;
-  for (std::size_t s = 0; s < sun.size(); ++s) sun[s] = toward_sun(scene.light, kSunDisc[s]);
   std::vector<Caster> casters;
   std::vector<Vec3> origins;
   std::vector<std::size_t> shaders;  // all but paint, and the floor, which lies under everything
@@ -97,6 +145,8 @@ void cast_rows(const Scene& scene, const PinholeCamera& camera, StillRays rays, 
     origins.push_back(casters.back().origin(camera.position));
     if (scene.statics[i].casts_shadow && i > 0) shaders.push_back(i);
   }
+  std::vector<Sunlight> sun;
+  for (const Offset offset : kSunDisc) sun.emplace_back(scene, shaders, toward_sun(scene.light, offset));
   std::size_t last_shader = 0;    // what hid the sun last is likely to hide it again
   std::vector<std::size_t> near;  // shapes that this tile may show
   // Nothing is higher than the lamp on the way to it.
@@ -161,14 +211,9 @@ void cast_rows(const Scene& scene, const PinholeCamera& camera, StillRays rays, 
             sky_sum = sky_sum + colour * skylight(scene.light, normal) * center_open;
             const Vec3 above = point + normal * 1e-3;
             if (scene.lamp) lamp_sum = lamp_sum + colour * lamp_on(above, normal);
-            const double facing = dot(normal, sun[k]);
+            const double facing = dot(normal, sun[k].toward());
             if (facing <= 0) continue;
-            bool hidden = blocks(scene.statics[shaders[last_shader]], above, sun[k]);
-            for (std::size_t i = 0; i < shaders.size() && !hidden; ++i) {
-              hidden = blocks(scene.statics[shaders[i]], above, sun[k]);
-              if (hidden) last_shader = i;
-            }
-            if (!hidden) sun_sum = sun_sum + colour * scene.light.sun * facing;
+            if (!sun[k].is_hidden(above, last_shader)) sun_sum = sun_sum + colour * scene.light.sun * facing;
           }
           const auto store = [&](std::vector<float>& plane, Vec3 v) {
             plane[3 * pixel] = static_cast<float>(v.x);

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -207,27 +206,6 @@ class Doctor {
 namespace stereotrack {
 
 namespace fs = std::filesystem;
-
-void add_options(CLI::App& command, DoctorArguments& arguments) {
-  CLI::Option* config =
-      command.add_option("--config", arguments.config, "checks its cameras, lines and rights; else what there is");
-  CLI::Option* measure =
-      command.add_flag("!--no-measure", arguments.measure, "only looks: opens no camera but to check");
-  command.add_option("--seconds", arguments.seconds, "of each measurement")
-      ->check(CLI::Range(0.1, 3600.0))
-      ->capture_default_str()
-      ->excludes(measure);
-  command
-      .add_option("--line", arguments.line,
-                  "CHIP:LINE: sets this output to and fro and tells how long that takes; no line is touched unasked")
-      ->excludes(measure);
-  command.add_flag("--json", arguments.json, "one JSON object, keys as in docs/DOCTOR.md");
-  command.add_option("--write", arguments.write, "writes a configuration for this board to a new file")
-      ->excludes(config);
-  command.add_option("--calibration", arguments.calibration, "calibration of the two cameras, for that configuration")
-      ->excludes(config);
-  command.footer("Exit code: 0 ready, 1 works with limits, which are named, 2 cannot run.");
-}
 
 int run_doctor(const DoctorArguments& arguments, std::ostream& out, std::ostream& messages) try {
   std::error_code ignored;

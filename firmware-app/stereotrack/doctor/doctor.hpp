@@ -5,10 +5,6 @@
 #include <optional>
 #include <string>
 
-namespace CLI {
-class App;
-}
-
 namespace stereotrack {
 
 /// `stereotrack doctor [--config FILE] [--seconds N] [--line CHIP:LINE] [--no-measure] [--json] [--write FILE]
@@ -23,9 +19,6 @@ struct DoctorArguments {
   bool json = false;
   std::filesystem::path root = "/";  ///< where sys, proc and dev are
 };
-
-/// Declares the arguments above.
-void add_options(CLI::App& command, DoctorArguments& arguments);
 
 /// Looks at the board, measures, tells. Answers the exit code: 0 ready, 1 works with limits, 2 cannot run. Throws
 /// config::Error for a wrong configuration, line name or file to write.

@@ -182,7 +182,7 @@ TEST_F(Vimc, OneIsClosedAndOpenedAnewWhileTheOtherGoesOn) {
 
 // libcamera 0.0.3 ends the process of who stops a camera that is gone, and of who sees it come back: the module keeps
 // both from happening. What is left of it is a silence, for which StereoCameras has its time-out.
-TEST_F(Vimc, ThatIsUnpluggedFallsSilentHarmsNobodyAndComesBack) {
+TEST_F(Vimc, ThatIsUnpluggedEndsHarmsNobodyAndComesBack) {
   auto left = started("vimc.0");
   auto right = started("vimc.1");
   SensorFrame frame;
@@ -195,7 +195,11 @@ TEST_F(Vimc, ThatIsUnpluggedFallsSilentHarmsNobodyAndComesBack) {
     end = wait_take(*right, frame, 1000);
     if (end == Camera::Take::kFrame) right->give_back(frame.buffer);
   }
-  EXPECT_EQ(end, Camera::Take::kNothing) << right->failure();
+  // Silent, or told of at once where libcamera had a request to queue just then.
+  ASSERT_NE(end, Camera::Take::kFrame);
+  if (end != Camera::Take::kNothing) {
+    EXPECT_THAT(right->failure(), HasSubstr("check its cable"));
+  }
   std::cout << "# " << more << " frames after it was unplugged\n";
   right.reset();
   const auto left_goes_on = [&] {
