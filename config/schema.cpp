@@ -250,7 +250,8 @@ std::vector<Key> keys_of(Configuration& c) {
           "With one view alone: how far a picture pulls a pixel's mean and noise at most. Lower keeps dense traffic "
           "out of them, higher calms leaves; 0: without bound, as always with two views."),
       key("background.absorb_frames", p.background.adaptive.absorb_frames, 2, 60000, "frames",
-          "What stands still for so long becomes background."),
+          "What stands still for so long becomes background; sooner where that was seen for less, but for what stereo "
+          "shows to stand before it."),
       key("background.noise_floor", p.background.adaptive.noise_floor, 1, 4096, "1/256 grey level",
           "Added to each pixel's measured noise: higher finds less in the dark and in clean pictures."),
       key("background.edge_percent", p.background.adaptive.edge_percent, 0, 200, "%",

@@ -283,7 +283,7 @@ Result<FrameResult> Pipeline::run(const FramePair& pair, EffortBits leave_out) n
   ended(Stage::kObjects);
   tracker_->update(detections, corners_in(), blobs_.labels);  // 3.25, 3.28-3.32
   ended(Stage::kTracking);
-  learn_background();
+  learn_background(detections);
   ended(Stage::kBackground);
 
   mask_of_labels(blobs_.labels, left_.mask);
@@ -641,26 +641,10 @@ void Pipeline::match_whole(Detector::Candidate& candidate, const Detector::Input
   // What the same place of the background measures: pixel by pixel, or matched as a whole. The questions are put in
   // the order of their price.
   const auto resembles = [&] { return resembles_background(candidate.box, candidate.label, candidate.area); };
-  const double limit =
-      std::max(config_.shadow.own_depth_px, std::min(2.5 * candidate.disparity_sd, kSurePart * candidate.disparity));
-  std::int64_t sum = 0;
-  int known = 0;
-  for_each_run(blobs_.labels, candidate.box, candidate.label, [&](int y, int begin, int end) {
-    const std::uint16_t* old = old_disparity_.row(y);
-    std::uint32_t sum_of_run = 0;
-    int known_of_run = 0;
-    for (int x = begin; x < end; ++x) {
-      const bool is_known = old[x] != kNoDisparity;
-      sum_of_run += is_known ? old[x] : 0U;
-      known_of_run += is_known ? 1 : 0;
-    }
-    sum += sum_of_run;
-    known += known_of_run;
-  });
-  if (known * 3 >= candidate.area) {
-    const double before = static_cast<double>(sum) / known / kDisparityScale;
-    const bool near = candidate.disparity - before <= limit;
-    candidate.own_surface = (near || (small && fits_at(before, roi, cost))) && resembles();
+  const double limit = surface_limit(candidate.disparity, candidate.disparity_sd);
+  if (const auto behind = disparity_behind(candidate.box, candidate.label, candidate.area)) {
+    const bool near = candidate.disparity - *behind <= limit;
+    candidate.own_surface = (near || (small && fits_at(*behind, roi, cost))) && resembles();
   } else if (resembles()) {
     const RegionMatch whole = match(background_canvases_, nowhere);
     if (!sure(whole)) return;
@@ -698,13 +682,53 @@ void Pipeline::check_pair(std::span<const Detection> detections) noexcept {
   setup_.decisions.tell(WrongPair{verdict.lag_s, verdict.witnesses});
 }
 
-void Pipeline::learn_background() noexcept {
+// The disparity that the background is known to have at the labelled pixels: their mean, where a third of them has one.
+std::optional<double> Pipeline::disparity_behind(const Rect& box, std::uint16_t label, int area) const noexcept {
+  std::int64_t sum = 0;
+  int known = 0;
+  for_each_run(blobs_.labels, box, label, [&](int y, int begin, int end) {
+    const std::uint16_t* old = old_disparity_.row(y);
+    std::uint32_t sum_of_run = 0;
+    int known_of_run = 0;
+    for (int x = begin; x < end; ++x) {
+      const bool is_known = old[x] != kNoDisparity;
+      sum_of_run += is_known ? old[x] : 0U;
+      known_of_run += is_known ? 1 : 0;
+    }
+    sum += sum_of_run;
+    known += known_of_run;
+  });
+  if (known == 0 || known * 3 < area) return std::nullopt;
+  return static_cast<double>(sum) / known / kDisparityScale;
+}
+
+// What stands still is absorbed by a background that was seen shorter, for it may have left a wrong one behind. Where
+// stereo tells that it stands before the background, that one is right.
+void Pipeline::confirm_background(std::span<const Detection> detections) noexcept {
+  if (!background_disparity_ || !sees_both_ || wrong_pair_) return;
+  for (std::size_t i = 0; i < detections.size(); ++i) {
+    const Detection& detection = detections[i];
+    if (!detection.has_depth) continue;
+    const auto label = static_cast<std::uint16_t>(i + 1);
+    const std::optional<double> behind = disparity_behind(detection.box, label, detection.area);
+    if (!behind || detection.disparity - *behind <= surface_limit(detection.disparity, detection.disparity_sd)) continue;
+    for_each_pixel(blobs_.labels, detection.box, label, [&](int x, int y) { background_left_->confirm(x, y); });
+  }
+}
+
+// So much nearer than the background's surface a thing is to be to stand before it [px].
+double Pipeline::surface_limit(double disparity, double disparity_sd) const noexcept {
+  return std::max(config_.shadow.own_depth_px, std::min(2.5 * disparity_sd, kSurePart * disparity));
+}
+
+void Pipeline::learn_background(std::span<const Detection> detections) noexcept {
   if (!background_left_) return;
   if (light_change_) {
     background_left_->restart();
     if (background_right_) background_right_->restart();
     if (background_disparity_) background_disparity_->restart();
   }
+  confirm_background(detections);
   background_left_->learn(left_planes(), moving_);
   if (background_right_ && sees_both_) background_right_->learn({right_.smooth_y, {}, {}}, right_.mask);
 }

@@ -158,7 +158,10 @@ class Pipeline {
   void match_whole(Detector::Candidate& candidate, const Detector::Input& in) noexcept;
   [[nodiscard]] bool fits_at(double disparity, const Rect& roi, double cost) noexcept;
   void check_pair(std::span<const Detection> detections) noexcept;
-  void learn_background() noexcept;
+  [[nodiscard]] std::optional<double> disparity_behind(const Rect& box, std::uint16_t label, int area) const noexcept;
+  [[nodiscard]] double surface_limit(double disparity, double disparity_sd) const noexcept;
+  void confirm_background(std::span<const Detection> detections) noexcept;
+  void learn_background(std::span<const Detection> detections) noexcept;
   [[nodiscard]] AdaptiveBackground::Planes left_planes() const noexcept;
   [[nodiscard]] ImageView<const std::uint16_t> disparity_now() const noexcept;
   [[nodiscard]] DisparityRange range_for(const Blob& blob) const noexcept;

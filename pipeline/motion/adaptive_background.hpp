@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -74,6 +75,13 @@ class AdaptiveBackground {
   /// Learns from the picture that distance() saw. mask: 0 where it is background, else one of the marks above.
   void learn(const Planes& picture, ImageView<const std::uint8_t> mask) noexcept;
 
+  /// What is seen here now is known to stand before the background: before the next learn(), the background counts as
+  /// seen for longer than that, so that absorb_frames alone make it give way.
+  void confirm(int x, int y) noexcept {
+    const int longer = std::min(candidate_age_.at(x, y) + 1, config_.absorb_frames);
+    age_.at(x, y) = static_cast<std::uint16_t>(std::max<int>(age_.at(x, y), longer));
+  }
+
   /// Forgets everything but the latest look: the next learn() starts a new mean.
   void restart() noexcept;
 
@@ -120,6 +128,6 @@ class AdaptiveBackground {
   std::span<std::uint16_t> bins_;       // of all pixels that the gain is estimated from
 };
 static_assert(RealTimeStage<AdaptiveBackground, &AdaptiveBackground::distance, &AdaptiveBackground::learn,
-                            &AdaptiveBackground::restart>);
+                            &AdaptiveBackground::confirm, &AdaptiveBackground::restart>);
 
 }  // namespace stereotrack

@@ -297,6 +297,38 @@ TEST(AdaptiveBackground, StoppedObjectIsAbsorbedAfterAbsorbFramesAndNotBefore) {
   EXPECT_LT(watch.foreground(object), 0.02);
 }
 
+TEST(AdaptiveBackground, WhatStandsBeforeAConfirmedOneIsAbsorbedNoSoonerHoweverYoungThatIs) {
+  const cv::Rect object(40, 20, 16, 14);
+  const cv::Mat_<float> empty = surface(kSize, 110);
+  const cv::Mat_<float> occupied = with_object(empty, object);
+  Watch left_alone;
+  Watch confirmed;
+  const auto both = [&](const cv::Mat_<float>& scene) {
+    left_alone.step(scene);
+    confirmed.step(scene);
+  };
+  const auto confirm = [&] {
+    for (int y = object.y; y < object.br().y; ++y) {
+      for (int x = object.x; x < object.br().x; ++x) confirmed.background->confirm(x, y);
+    }
+  };
+  for (int t = 0; t < 12; ++t) both(empty);
+  for (int t = 1; t <= 38; ++t) {
+    confirm();
+    both(occupied);
+    ASSERT_GT(confirmed.foreground(inner(object, 1)), 0.98) << t;
+  }
+  EXPECT_LT(left_alone.foreground(object), 0.02) << "it would have stayed anyway";
+  confirmed.look(empty);
+  EXPECT_EQ(confirmed.foreground(object), 0) << "the background is no longer what it was";
+  for (int t = 0; t < 6; ++t) {
+    confirm();
+    confirmed.step(occupied);
+  }
+  confirmed.look(occupied);
+  EXPECT_LT(confirmed.foreground(object), 0.02);
+}
+
 TEST(AdaptiveBackground, MovingObjectIsNeverAbsorbed) {
   const cv::Mat_<float> empty = surface(kSize, 110);
   Watch watch;
