@@ -711,7 +711,8 @@ void Pipeline::confirm_background(std::span<const Detection> detections) noexcep
     if (!detection.has_depth) continue;
     const auto label = static_cast<std::uint16_t>(i + 1);
     const std::optional<double> behind = disparity_behind(detection.box, label, detection.area);
-    if (!behind || detection.disparity - *behind <= surface_limit(detection.disparity, detection.disparity_sd)) continue;
+    if (!behind || detection.disparity - *behind <= surface_limit(detection.disparity, detection.disparity_sd))
+      continue;
     for_each_pixel(blobs_.labels, detection.box, label, [&](int x, int y) { background_left_->confirm(x, y); });
   }
 }

@@ -18,7 +18,8 @@ constexpr std::uint64_t kFrom = 60;
 constexpr std::uint64_t kTo = 200;
 
 TEST(Stop, WhoStandsForFiveSecondsKeepsItsIdentityAndIsSeenAllTheTime) {
-  capture::SyntheticSource source("stop-and-go", {.seed = 1, .frames = kTo, .width = 320, .height = 240, .truth = true});
+  capture::SyntheticSource source("stop-and-go",
+                                  {.seed = 1, .frames = kTo, .width = 320, .height = 240, .truth = true});
   Pipeline::Setup setup;
   setup.width = source.info().width;
   setup.height = source.info().height;
