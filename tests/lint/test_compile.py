@@ -111,6 +111,7 @@ class Compile(unittest.TestCase):
                     copy.parent.mkdir(parents=True, exist_ok=True)
                     copy.write_text(text)
                 done = self.compile("".join(f'#include "{name}"\n' for name in texts), folder)
+            self.assertNotEqual(done.returncode, 0)
             self.assertIn("RealTimeStage", done.stderr)
             for (name, line), what in broken.items():
                 with self.subTest(what=what):

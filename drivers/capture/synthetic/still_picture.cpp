@@ -38,11 +38,18 @@ constexpr std::array<Offset, 13> kSunDisc{{{-0.5, -0.5},
                                            {-0.7, 0.6},
                                            {0, 0}}};
 
+/// Two unit directions across a third, and across each other; `side` is level.
+struct Across {
+  explicit Across(Vec3 along) noexcept
+      : side(normalized({along.z, 0, -along.x})),
+        up{along.y * side.z, along.z * side.x - along.x * side.z, -along.y * side.x} {}
+  Vec3 side;
+  Vec3 up;
+};
+
 /// A direction `offset` radii off the middle of the sun.
 Vec3 toward_sun(const Light& light, Offset offset) noexcept {
-  const Vec3 side = normalized({light.to_sun.z, 0, -light.to_sun.x});
-  const Vec3 up = {light.to_sun.y * side.z, light.to_sun.z * side.x - light.to_sun.x * side.z,
-                   -light.to_sun.y * side.x};
+  const auto [side, up] = Across(light.to_sun);
   return normalized(light.to_sun + (side * offset.x + up * offset.y) * light.sun_radius);
 }
 
@@ -77,16 +84,12 @@ class Sunlight {
  public:
   /// `shaders`: of the scene's statics; outlives this, as the scene does.
   Sunlight(const Scene& scene, std::span<const std::size_t> shaders, Vec3 toward)
-      : scene_(scene),
-        shaders_(shaders),
-        toward_(toward),
-        right_(normalized({toward.z, 0, -toward.x})),
-        up_{toward.y * right_.z, toward.z * right_.x - toward.x * right_.z, -toward.y * right_.x} {
+      : scene_(scene), shaders_(shaders), toward_(toward), across_(toward) {
     constexpr double kRounding = 1e-6;  // [m], far more than the sums below lose
     for (const std::size_t i : shaders) {
       const Shape& shape = scene.statics[i];
       const double radius = shape.bounding_radius + kRounding;
-      circles_.push_back({dot(right_, shape.center), dot(up_, shape.center), radius * radius});
+      circles_.push_back({dot(across_.side, shape.center), dot(across_.up, shape.center), radius * radius});
     }
   }
 
@@ -95,8 +98,8 @@ class Sunlight {
   /// `last`: index in shaders of what hid the sun from a neighbour, which is likely to hide it again; kept.
   [[nodiscard]] bool is_hidden(Vec3 from, std::size_t& last) const noexcept {
     if (last < shaders_.size() && blocks(scene_.statics[shaders_[last]], from, toward_)) return true;
-    const double u = dot(right_, from);
-    const double v = dot(up_, from);
+    const double u = dot(across_.side, from);
+    const double v = dot(across_.up, from);
     for (std::size_t i = 0; i < circles_.size(); ++i) {
       const Circle& circle = circles_[i];
       const double du = circle.u - u;
@@ -116,8 +119,7 @@ class Sunlight {
   const Scene& scene_;
   std::span<const std::size_t> shaders_;
   Vec3 toward_;
-  Vec3 right_;  // across the way to the sun
-  Vec3 up_;
+  Across across_;
   std::vector<Circle> circles_;
 };
 

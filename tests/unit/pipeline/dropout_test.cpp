@@ -6,6 +6,7 @@
 
 #include "drivers/capture/synthetic/synthetic_source.hpp"
 #include "pipeline/pipeline.hpp"
+#include "tests/unit/pipeline/scene_setup.hpp"
 
 namespace stereotrack {
 namespace {
@@ -15,13 +16,8 @@ constexpr std::uint64_t kLast = 380;
 
 TEST(Dropout, WrongPairsAreToldWhereSomethingMovesFastEnough) {
   capture::SyntheticSource source("dropout", {.seed = 1, .frames = kLast});
-  Pipeline::Setup setup;
-  setup.width = source.info().width;
-  setup.height = source.info().height;
-  setup.colour = true;
-  setup.calibration = &source.calibration();
   Arena arena;
-  Result<Pipeline> pipeline = Pipeline::create({}, setup, arena);
+  Result<Pipeline> pipeline = Pipeline::create({}, test::setup_of(source), arena);
   ASSERT_TRUE(pipeline.has_value());
   int wrong = 0;
   int told = 0;

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <optional>
 #include <set>
 
 #include "drivers/capture/synthetic/synthetic_source.hpp"
 #include "pipeline/pipeline.hpp"
+#include "tests/unit/pipeline/scene_setup.hpp"
 
 namespace stereotrack {
 namespace {
@@ -20,13 +20,8 @@ constexpr std::uint64_t kTo = 200;
 TEST(Stop, WhoStandsForFiveSecondsKeepsItsIdentityAndIsSeenAllTheTime) {
   capture::SyntheticSource source("stop-and-go",
                                   {.seed = 1, .frames = kTo, .width = 320, .height = 240, .truth = true});
-  Pipeline::Setup setup;
-  setup.width = source.info().width;
-  setup.height = source.info().height;
-  setup.colour = true;
-  setup.calibration = &source.calibration();
   Arena arena;
-  Result<Pipeline> pipeline = Pipeline::create({}, setup, arena);
+  Result<Pipeline> pipeline = Pipeline::create({}, test::setup_of(source), arena);
   ASSERT_TRUE(pipeline.has_value());
   std::set<std::uint32_t> ids;
   int seen = 0;
