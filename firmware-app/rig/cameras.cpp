@@ -8,7 +8,6 @@
 #include "config/error.hpp"
 #include "config/milliseconds.hpp"
 #include "drivers/capture/libcamera/libcamera.hpp"
-#include "drivers/capture/v4l2/v4l2.hpp"
 #include "firmware-app/rig/trigger.hpp"
 
 namespace stereotrack {
@@ -42,8 +41,9 @@ std::string line_of(Side side, const capture::CameraInfo& info) {
          capture::delivery_text(info) + " at " + rate + " frames/s";
 }
 
-/// What each driver is asked for.
-capture::CameraSettings settings_of(const config::CameraConfig& camera, Side side) {
+}  // namespace
+
+capture::CameraSettings camera_settings(const config::CameraConfig& camera, Side side) {
   capture::CameraSettings settings;
   settings.device = (side == Side::kLeft ? camera.left : camera.right).device;
   settings.width = camera.width;
@@ -59,7 +59,7 @@ capture::CameraSettings settings_of(const config::CameraConfig& camera, Side sid
 
 capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, Side side) {
   capture::v4l2::Settings settings;
-  static_cast<capture::CameraSettings&>(settings) = settings_of(camera, side);
+  static_cast<capture::CameraSettings&>(settings) = camera_settings(camera, side);
   settings.sensor = (side == Side::kLeft ? camera.left : camera.right).sensor;
   settings.heap = camera.heap;
   if (camera.memory == config::CameraMemory::kDmabuf) {
@@ -69,8 +69,6 @@ capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, Side s
   settings.control_delay_frames = camera.control_delay_frames;
   return settings;
 }
-
-}  // namespace
 
 capture::StereoCameras::Config pairing_config(const config::Configuration& configuration) {
   const config::CameraConfig& camera = configuration.camera;
@@ -96,7 +94,7 @@ capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
   return [camera, say = std::move(say)](Side side) {
     std::vector<std::string> notes;
     std::unique_ptr<capture::Camera> opened = is_libcamera(camera)
-                                                  ? capture::libcamera::open(settings_of(camera, side), &notes)
+                                                  ? capture::libcamera::open(camera_settings(camera, side), &notes)
                                                   : capture::v4l2::open(v4l2_settings(camera, side), &notes);
     for (const std::string& note : notes) say(note);
     return opened;

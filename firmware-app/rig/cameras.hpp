@@ -8,11 +8,16 @@
 
 #include "config/load.hpp"
 #include "drivers/capture/stereo_cameras/stereo_cameras.hpp"
+#include "drivers/capture/v4l2/v4l2.hpp"
 
 namespace stereotrack {
 
 /// The source.name of cameras.
 inline constexpr std::string_view kCameras = "cameras";
+
+/// What the driver of a side is asked for: of either driver, and by V4L2 besides.
+[[nodiscard]] capture::CameraSettings camera_settings(const config::CameraConfig& camera, trigger::Side side);
+[[nodiscard]] capture::v4l2::Settings v4l2_settings(const config::CameraConfig& camera, trigger::Side side);
 
 /// How two of them become pairs.
 [[nodiscard]] capture::StereoCameras::Config pairing_config(const config::Configuration& configuration);
