@@ -1,13 +1,13 @@
 #include "firmware-app/rig/trigger.hpp"
 
 #include <cmath>
-#include <cstdarg>
 #include <cstdio>
 #include <stdexcept>
 #include <utility>
 
 #include "config/milliseconds.hpp"
 #include "drivers/trigger/edges.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/rig/cameras.hpp"
 #include "firmware-app/signals/set_up.hpp"
 
@@ -34,22 +34,13 @@ gpio::InputSpec input_of(const TriggerConfig& said) {
           .edges = signals::edges_of(said.edge)};
 }
 
-[[gnu::format(printf, 1, 2)]] std::string text_of(const char* format, ...) {
-  char text[256];
-  va_list values;
-  va_start(values, format);
-  (void)std::vsnprintf(text, sizeof text, format, values);
-  va_end(values);
-  return text;
-}
-
 std::string level_text(const TriggerConfig& said) {
   return said.active == config::ActiveLevel::kLow ? "active low" : "active high";
 }
 
 std::string exposure_text(const TriggerConfig& said) {
-  return text_of("; exposures begin %.0f us after the %s edge", said.delay_us,
-                 said.edge == config::InputEdge::kFalling ? "falling" : "rising");
+  return formatted("; exposures begin %.0f us after the %s edge", said.delay_us,
+                   said.edge == config::InputEdge::kFalling ? "falling" : "rising");
 }
 
 }  // namespace
@@ -105,24 +96,24 @@ std::string check_trigger(const config::Configuration& configuration) {
   switch (mode_of(configuration)) {
     case TriggerMode::kFreeRun: break;
     case TriggerMode::kUnseen:
-      return text_of("trigger: unseen, %.1f exposures/s expected; silence of both cameras is no fault",
-                     configuration.camera.fps);
+      return formatted("trigger: unseen, %.1f exposures/s expected; silence of both cameras is no fault",
+                       configuration.camera.fps);
     case TriggerMode::kGpio:
       return "trigger: gpio " + said.line + ", " + level_text(said) +
-             text_of(": %.1f pulses/s of %.0f us", configuration.camera.fps, said.pulse_us) + exposure_text(said);
+             formatted(": %.1f pulses/s of %.0f us", configuration.camera.fps, said.pulse_us) + exposure_text(said);
     case TriggerMode::kPwm: {
       const trigger::Pwm::Config pwm = *trigger_pwm(configuration);
       const trigger::PwmChip chip = trigger::find_pwm(pwm);
       return "trigger: pwm " + chip.name + (chip.device.empty() ? "" : " (" + chip.device + ")") +
-             text_of(" channel %u, ", pwm.channel) + level_text(said) +
-             text_of(": %.1f pulses/s of %.0f us; their times are not told: pairs are formed without",
-                     configuration.camera.fps, said.pulse_us);
+             formatted(" channel %u, ", pwm.channel) + level_text(said) +
+             formatted(": %.1f pulses/s of %.0f us; their times are not told: pairs are formed without",
+                       configuration.camera.fps, said.pulse_us);
     }
     case TriggerMode::kExternal: {
       const gpio::InputSpec spec = input_of(said);
       gpio::check_inputs({&spec, 1});
       return "trigger: external " + said.line + ", " + level_text(said) +
-             text_of(": %.1f pulses/s expected", configuration.camera.fps) + exposure_text(said);
+             formatted(": %.1f pulses/s expected", configuration.camera.fps) + exposure_text(said);
     }
   }
   return "trigger: none, each camera runs by itself";

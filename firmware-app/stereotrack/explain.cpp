@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <set>
 #include <utility>
 
 #include "config/error.hpp"
+#include "firmware-app/formatted.hpp"
 
 namespace stereotrack {
 
@@ -20,20 +19,11 @@ constexpr std::size_t kMostRejected = 1024;
 // A detection that is this many gates away is not worth a line.
 constexpr double kFarGates = 4;
 
-[[gnu::format(printf, 1, 2)]] std::string format(const char* form, ...) {
-  char text[512];
-  std::va_list values;
-  va_start(values, form);
-  (void)std::vsnprintf(text, sizeof text, form, values);
-  va_end(values);
-  return text;
-}
-
-std::string text_of(const Rect& box) { return format("%d,%d %dx%d", box.left, box.top, box.width, box.height); }
+std::string text_of(const Rect& box) { return formatted("%d,%d %dx%d", box.left, box.top, box.width, box.height); }
 
 std::string text_of(const PairCost& cost, double limit) {
-  return format("picture %.1f + depth %.1f + size %.1f + corners %.1f + looks %.1f = %.1f of %.1f", cost.picture,
-                cost.depth, cost.size, cost.corners, cost.looks, cost.sum(), limit);
+  return formatted("picture %.1f + depth %.1f + size %.1f + corners %.1f + looks %.1f = %.1f of %.1f", cost.picture,
+                   cost.depth, cost.size, cost.corners, cost.looks, cost.sum(), limit);
 }
 
 const char* text_of(TrackState state) {
@@ -123,9 +113,9 @@ const render::Annotation& Explanation::frame_ends(const FrameResult& result, dou
     if (wanted && of_it && decision.id != 0) ids.insert(decision.id);
   }
   if (ids.empty() && (request_.id != 0 || !wanted)) return annotation_;
-  say(format("frame %llu, %.3f s", static_cast<unsigned long long>(result.ordinal), seconds));
+  say(formatted("frame %llu, %.3f s", static_cast<unsigned long long>(result.ordinal), seconds));
   if (wrong_pair_) {
-    say(format(
+    say(formatted(
         "  wrong pair: the right picture is %.0f ms %s than the left one, told by %d target%s; no depth is taken",
         1000 * std::abs(wrong_pair_->lag_s), wrong_pair_->lag_s > 0 ? "later" : "earlier", wrong_pair_->witnesses,
         wrong_pair_->witnesses == 1 ? "" : "s"));
@@ -133,7 +123,7 @@ const render::Annotation& Explanation::frame_ends(const FrameResult& result, dou
   if (request_.id == 0) explain_detections(result);
   for (const std::uint32_t id : ids) explain_target(result, id);
   explain_rejected();
-  if (left_out_ > 0) say(format("  %zu more decisions are left out", left_out_));
+  if (left_out_ > 0) say(formatted("  %zu more decisions are left out", left_out_));
   return annotation_;
 }
 
@@ -141,9 +131,9 @@ void Explanation::explain_detections(const FrameResult& result) {
   for (std::size_t j = 0; j < result.detections.size(); ++j) {
     const Detection& one = result.detections[j];
     std::string line =
-        format("  detection %zu: %s, %d px, strength %.2f", j + 1, text_of(one.box).c_str(), one.area, one.strength);
+        formatted("  detection %zu: %s, %d px, strength %.2f", j + 1, text_of(one.box).c_str(), one.area, one.strength);
     if (one.has_depth) {
-      line += format(", disparity %.2f +- %.2f px, z ", one.disparity, one.disparity_sd) + length(one.position.z());
+      line += formatted(", disparity %.2f +- %.2f px, z ", one.disparity, one.disparity_sd) + length(one.position.z());
     } else {
       line += ", no depth";
     }
@@ -155,12 +145,12 @@ void Explanation::explain_detections(const FrameResult& result) {
 std::string Explanation::fate(std::uint16_t detection) const {
   for (const Decision& decision : decisions_) {
     if (decision.detection != detection) continue;
-    if (decision.kind == Decision::Kind::kTook) return format("taken by #%u", decision.id);
-    if (decision.kind == Decision::Kind::kBorn) return format("new: #%u", decision.id);
+    if (decision.kind == Decision::Kind::kTook) return formatted("taken by #%u", decision.id);
+    if (decision.kind == Decision::Kind::kBorn) return formatted("new: #%u", decision.id);
     if (decision.kind == Decision::Kind::kNoneBegin) {
       return wrong_pair_ ? "no target's: none begins in a wrong pair" : "no target's: none begins in its zone";
     }
-    if (decision.kind == Decision::Kind::kNoRoom) return format("lost: %d targets are there", Tracker::kMaxTracks);
+    if (decision.kind == Decision::Kind::kNoRoom) return formatted("lost: %d targets are there", Tracker::kMaxTracks);
   }
   return "no target's";
 }
@@ -168,16 +158,16 @@ std::string Explanation::fate(std::uint16_t detection) const {
 void Explanation::explain_target(const FrameResult& result, std::uint32_t id) {
   const auto report = std::find_if(result.tracks.begin(), result.tracks.end(),
                                    [id](const TrackReport& track) { return track.id == id; });
-  std::string head = format("  #%u ", id);
+  std::string head = formatted("  #%u ", id);
   if (report == result.tracks.end()) {
     head += "is no more";
   } else {
-    head += format("%s, age %.2f s, box %s, %+.0f %+.0f px/s", text_of(report->state), report->age_s,
-                   text_of(report->box).c_str(), report->image_vx, report->image_vy);
+    head += formatted("%s, age %.2f s, box %s, %+.0f %+.0f px/s", text_of(report->state), report->age_s,
+                      text_of(report->box).c_str(), report->image_vx, report->image_vy);
     if (report->has_depth) head += ", z " + length(report->position.z());
     if (id == request_.id) last_box_ = report->box;
     if (!report->measured)
-      annotation_.marks.push_back({report->box, format("#%u expected", id), render::Annotation::Kind::kExpected});
+      annotation_.marks.push_back({report->box, formatted("#%u expected", id), render::Annotation::Kind::kExpected});
   }
   say(std::move(head));
   std::uint16_t taken = 0;
@@ -204,30 +194,30 @@ void Explanation::explain_others(const FrameResult& result, std::uint32_t id, st
     switch (decision.cost.gate) {
       case PairCost::Gate::kOpen: why = text_of(decision.cost, decision.limit); break;
       case PairCost::Gate::kPicture:
-        why = format("%+.1f %+.1f px from where it was expected to +- %.1f %.1f: %.1f, gate %.1f", decision.offset_x,
-                     decision.offset_y, decision.sd_x, decision.sd_y, decision.cost.picture, gate);
+        why = formatted("%+.1f %+.1f px from where it was expected to +- %.1f %.1f: %.1f, gate %.1f", decision.offset_x,
+                        decision.offset_y, decision.sd_x, decision.sd_y, decision.cost.picture, gate);
         break;
       case PairCost::Gate::kDepth:
-        why = format("%+.2f px of disparity from what was expected: %.1f, gate %.1f", decision.offset_disparity,
-                     decision.cost.depth, gate);
+        why = formatted("%+.2f px of disparity from what was expected: %.1f, gate %.1f", decision.offset_disparity,
+                        decision.cost.depth, gate);
         break;
     }
-    say(format("    not detection %u: ", decision.detection) + why + "; " + fate(decision.detection));
+    say(formatted("    not detection %u: ", decision.detection) + why + "; " + fate(decision.detection));
     if (decision.detection <= result.detections.size()) {
       annotation_.marks.push_back({result.detections[decision.detection - 1U].box, std::to_string(decision.detection),
                                    render::Annotation::Kind::kDetection});
     }
   }
-  if (far > 0) say(format("    %d more %s farther away", far, far == 1 ? "is" : "are"));
+  if (far > 0) say(formatted("    %d more %s farther away", far, far == 1 ? "is" : "are"));
 }
 
 void Explanation::explain_rejected() {
   const Rect near = grown(last_box_, std::max(last_box_.width, last_box_.height) / 2);
   for (const RejectedCandidate& candidate : rejected_) {
     if (request_.id != 0 && intersect(near, candidate.box).empty()) continue;
-    std::string line = format("  rejected %s, %d px", text_of(candidate.box).c_str(), candidate.area);
-    if (candidate.has_depth) line += format(", disparity %.2f px", candidate.disparity);
-    if (candidate.size_m > 0) line += format(", %.2f m long", candidate.size_m);
+    std::string line = formatted("  rejected %s, %d px", text_of(candidate.box).c_str(), candidate.area);
+    if (candidate.has_depth) line += formatted(", disparity %.2f px", candidate.disparity);
+    if (candidate.size_m > 0) line += formatted(", %.2f m long", candidate.size_m);
     say(line + ": " + reason(candidate.why));
     annotation_.marks.push_back({candidate.box, to_string(candidate.why), render::Annotation::Kind::kRejected});
   }
@@ -238,47 +228,47 @@ std::string Explanation::sentence(const Decision& decision) const {
   switch (decision.kind) {
     case Decision::Kind::kWeighed: break;
     case Decision::Kind::kTook: {
-      std::string line = format("took detection %u, %s", decision.detection, to_string(decision.taken));
+      std::string line = formatted("took detection %u, %s", decision.detection, to_string(decision.taken));
       for (const Decision& pair : decisions_) {
         const bool same = pair.kind == Decision::Kind::kWeighed && pair.id == decision.id;
         if (!same || pair.detection != decision.detection || pair.cost.gate != PairCost::Gate::kOpen) continue;
-        line += format(": %+.1f %+.1f px from where it was expected to +- %.1f %.1f", pair.offset_x, pair.offset_y,
-                       pair.sd_x, pair.sd_y);
-        if (pair.cost.depth > 0) line += format(", disparity %+.2f px", pair.offset_disparity);
+        line += formatted(": %+.1f %+.1f px from where it was expected to +- %.1f %.1f", pair.offset_x, pair.offset_y,
+                          pair.sd_x, pair.sd_y);
+        if (pair.cost.depth > 0) line += formatted(", disparity %+.2f px", pair.offset_disparity);
         line += "; " + text_of(pair.cost, pair.limit);
         break;
       }
       return line;
     }
     case Decision::Kind::kMissed:
-      return format("no detection is its own: unseen for %.2f s, coasts until %.2f s", decision.unseen_s,
-                    decision.limit_s);
+      return formatted("no detection is its own: unseen for %.2f s, coasts until %.2f s", decision.unseen_s,
+                       decision.limit_s);
     case Decision::Kind::kBorn: {
-      std::string line = format("born of detection %u", decision.detection);
-      if (decision.other != 0) line += format(", a part of #%u's region: on trial", decision.other);
+      std::string line = formatted("born of detection %u", decision.detection);
+      if (decision.other != 0) line += formatted(", a part of #%u's region: on trial", decision.other);
       return line;
     }
-    case Decision::Kind::kNoRoom: return format("detection %u found no room", decision.detection);
+    case Decision::Kind::kNoRoom: return formatted("detection %u found no room", decision.detection);
     case Decision::Kind::kNoneBegin: break;  // of no target
     case Decision::Kind::kConfirmed:
-      return format("confirmed: %d detections, evidence %.2f, way %.1f of %.1f px", decision.hits, decision.evidence,
-                    decision.way_px, decision.path_px);
+      return formatted("confirmed: %d detections, evidence %.2f, way %.1f of %.1f px", decision.hits, decision.evidence,
+                       decision.way_px, decision.path_px);
     case Decision::Kind::kWaits: {
-      std::string line = format(
+      std::string line = formatted(
           "waits: detections %d of %d, evidence %.2f of %.2f, way %.1f of %.1f px, %.0f%% of its "
           "path, wanted %.0f%%",
           decision.hits, track.confirm_hits, decision.evidence, track.confirm_evidence, decision.way_px,
           track.travel_px, decision.path_px > 0 ? 100 * decision.way_px / decision.path_px : 0.0,
           100 * track.straight_part);
-      if (decision.other != 0) line += format("; on trial as a part of #%u's region", decision.other);
+      if (decision.other != 0) line += formatted("; on trial as a part of #%u's region", decision.other);
       return line;
     }
     case Decision::Kind::kRemoved: {
-      std::string line = format("removed: %s", to_string(decision.removal));
+      std::string line = formatted("removed: %s", to_string(decision.removal));
       if (decision.removal == Removal::kUnseen) {
-        line += format(", %.2f s of %.2f s", decision.unseen_s, decision.limit_s);
+        line += formatted(", %.2f s of %.2f s", decision.unseen_s, decision.limit_s);
       }
-      if (decision.other != 0) line += format(", #%u", decision.other);
+      if (decision.other != 0) line += formatted(", #%u", decision.other);
       return line;
     }
   }
@@ -286,7 +276,7 @@ std::string Explanation::sentence(const Decision& decision) const {
 }
 
 std::string Explanation::length(double value) const {
-  return unit_m_ > 0 ? format("%.2f m", value * unit_m_) : format("%.3f u", value);
+  return unit_m_ > 0 ? formatted("%.2f m", value * unit_m_) : formatted("%.3f u", value);
 }
 
 }  // namespace stereotrack

@@ -8,7 +8,6 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <cstdarg>
 #include <cstdio>
 #include <deque>
 #include <map>
@@ -20,6 +19,7 @@
 
 #include "drivers/telemetry/receiver.hpp"
 #include "drivers/telemetry/udp_listener.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrack/interrupt.hpp"
 #include "pipeline/effort.hpp"
 
@@ -41,15 +41,6 @@ constexpr auto kRateSpan = std::chrono::seconds(2);
 constexpr auto kSave = std::chrono::seconds(5);
 constexpr int kBurst = 64;  // datagrams taken before signals and the screen get their turn again
 
-[[gnu::format(printf, 2, 3)]] void append(std::string& text, const char* format, ...) {
-  std::array<char, 256> line{};
-  va_list values;
-  va_start(values, format);
-  const int size = std::vsnprintf(line.data(), line.size(), format, values);
-  va_end(values);
-  if (size > 0) text.append(line.data(), std::min(static_cast<std::size_t>(size), line.size() - 1));
-}
-
 using BitName = std::pair<std::uint32_t, const char*>;
 
 /// "a,b", "-" for none; what has no name as a number.
@@ -61,7 +52,7 @@ std::string bit_names(std::uint32_t bits, std::span<const BitName> names) {
     text += name;
     bits &= ~bit;
   }
-  if (bits != 0) append(text, "%s0x%x", text.empty() ? "" : ",", bits);
+  if (bits != 0) text += formatted("%s0x%x", text.empty() ? "" : ",", bits);
   return text.empty() ? "-" : text;
 }
 
@@ -132,7 +123,7 @@ void append_number(std::string& json, float value) {
 
 template <class Values>
 void append_array(std::string& json, const char* name, const Values& values) {
-  append(json, ",\"%s\":[", name);
+  json += formatted(",\"%s\":[", name);
   bool first = true;
   for (const float value : values) {
     if (!first) json += ',';
@@ -143,28 +134,28 @@ void append_array(std::string& json, const char* name, const Values& values) {
 }
 
 void append_field(std::string& json, const char* name, float value) {
-  append(json, ",\"%s\":", name);
+  json += formatted(",\"%s\":", name);
   append_number(json, value);
 }
 
 void append_live(std::string& json, const Live& live) {
-  append(json, ",\"live\":{\"tai_offset_ns\":%jd", std::intmax_t{live.tai_offset.count()});
+  json += formatted(",\"live\":{\"tai_offset_ns\":%jd", std::intmax_t{live.tai_offset.count()});
   const auto optional = [&](const char* name, const std::optional<std::chrono::nanoseconds>& value) {
-    if (value) append(json, ",\"%s\":%jd", name, std::intmax_t{value->count()});
+    if (value) json += formatted(",\"%s\":%jd", name, std::intmax_t{value->count()});
   };
   optional("tai_error_ns", live.tai_error);
   optional("pair_skew_ns", live.pair_skew);
-  if (live.exposure_left_us != 0) append(json, ",\"exposure_left_us\":%u", live.exposure_left_us);
-  if (live.exposure_right_us != 0) append(json, ",\"exposure_right_us\":%u", live.exposure_right_us);
+  if (live.exposure_left_us != 0) json += formatted(",\"exposure_left_us\":%u", live.exposure_left_us);
+  if (live.exposure_right_us != 0) json += formatted(",\"exposure_right_us\":%u", live.exposure_right_us);
   optional("send_error_ns", live.send_error);
-  append(json, ",\"efforts_shed\":%u,\"health\":%u}", unsigned{live.efforts_shed}, live.health);
+  json += formatted(",\"efforts_shed\":%u,\"health\":%u}", unsigned{live.efforts_shed}, live.health);
 }
 
 /// Names and values, in the order of stereotrack.proto.
 void append_status(std::string& json, const Status& s, std::uint64_t sequence) {
-  append(json, ",\"status\":{\"sequence\":%ju", std::uintmax_t{sequence});
+  json += formatted(",\"status\":{\"sequence\":%ju", std::uintmax_t{sequence});
   const auto field = [&](const char* name, std::uint64_t value) {
-    append(json, ",\"%s\":%ju", name, std::uintmax_t{value});
+    json += formatted(",\"%s\":%ju", name, std::uintmax_t{value});
   };
   field("uptime_ms", s.uptime_ms);
   field("health", s.health);
@@ -219,32 +210,32 @@ void append_status(std::string& json, const Status& s, std::uint64_t sequence) {
 std::string to_json(const Datagram& datagram, std::optional<std::uint32_t> key_id) {
   const Header& h = datagram.header;
   std::string json;
-  append(json, "{\"schema\":%u,\"rig\":%u,\"session\":%ju", telemetry::kSchemaVersion, h.rig,
-         std::uintmax_t{h.session});
-  if (key_id) append(json, ",\"key_id\":%u", *key_id);
+  json += formatted("{\"schema\":%u,\"rig\":%u,\"session\":%ju", telemetry::kSchemaVersion, h.rig,
+                    std::uintmax_t{h.session});
+  if (key_id) json += formatted(",\"key_id\":%u", *key_id);
   if (datagram.status) {
-    append(json, ",\"send_time_ns\":%jd", std::intmax_t{h.send_time_ns});
+    json += formatted(",\"send_time_ns\":%jd", std::intmax_t{h.send_time_ns});
     if (datagram.live) append_live(json, *datagram.live);
     append_status(json, *datagram.status, datagram.status_sequence);
     return json + "}\n";
   }
-  append(json, ",\"sequence\":%ju,\"part\":%u,\"parts\":%u,\"ordinal\":%ju", std::uintmax_t{h.sequence}, h.part,
-         h.parts, std::uintmax_t{h.ordinal});
-  append(json, ",\"capture_time_ns\":%jd,\"send_time_ns\":%jd,\"latency_ns\":%u,\"flags\":%u",
-         std::intmax_t{h.capture_time_ns}, std::intmax_t{h.send_time_ns}, h.latency_ns, h.flags);
-  append(json, ",\"frames_skipped\":%u,\"tracks_dropped\":%u,\"targets_dropped\":%u,\"targets_refused\":%u",
-         h.frames_skipped, h.tracks_dropped, h.targets_dropped, h.targets_refused);
+  json += formatted(",\"sequence\":%ju,\"part\":%u,\"parts\":%u,\"ordinal\":%ju", std::uintmax_t{h.sequence}, h.part,
+                    h.parts, std::uintmax_t{h.ordinal});
+  json += formatted(",\"capture_time_ns\":%jd,\"send_time_ns\":%jd,\"latency_ns\":%u,\"flags\":%u",
+                    std::intmax_t{h.capture_time_ns}, std::intmax_t{h.send_time_ns}, h.latency_ns, h.flags);
+  json += formatted(",\"frames_skipped\":%u,\"tracks_dropped\":%u,\"targets_dropped\":%u,\"targets_refused\":%u",
+                    h.frames_skipped, h.tracks_dropped, h.targets_dropped, h.targets_refused);
   if (h.unit_m > 0) append_field(json, "unit_m", h.unit_m);
   if (datagram.live) append_live(json, *datagram.live);
   json += ",\"targets\":[";
   bool first = true;
   for (const Target& t : datagram.targets) {
-    append(json, "%s{\"id\":%u,\"state\":\"%s\",\"measured\":%s,\"has_depth\":%s", first ? "" : ",", t.id,
-           to_string(t.state), t.measured ? "true" : "false", t.has_depth ? "true" : "false");
+    json += formatted("%s{\"id\":%u,\"state\":\"%s\",\"measured\":%s,\"has_depth\":%s", first ? "" : ",", t.id,
+                      to_string(t.state), t.measured ? "true" : "false", t.has_depth ? "true" : "false");
     first = false;
     append_field(json, "age_s", t.age_s);
     append_field(json, "confidence", t.confidence);
-    append(json, ",\"box\":[%d,%d,%d,%d]", t.box.left, t.box.top, t.box.width, t.box.height);
+    json += formatted(",\"box\":[%d,%d,%d,%d]", t.box.left, t.box.top, t.box.width, t.box.height);
     if (t.has_depth) {
       append_array(json, "position", t.position);
       append_array(json, "velocity", t.velocity);
@@ -266,13 +257,13 @@ std::string to_json(const Datagram& datagram, std::optional<std::uint32_t> key_i
 std::string live_text(const Live& live) {
   std::string text;
   const auto micro = [](std::chrono::nanoseconds value) { return static_cast<double>(value.count()) * 1e-3; };
-  if (live.pair_skew) append(text, "skew %+.1f us  ", micro(*live.pair_skew));
+  if (live.pair_skew) text += formatted("skew %+.1f us  ", micro(*live.pair_skew));
   if (live.exposure_left_us != 0 || live.exposure_right_us != 0) {
-    append(text, "exposures %.1f %.1f ms  ", live.exposure_left_us * 1e-3, live.exposure_right_us * 1e-3);
+    text += formatted("exposures %.1f %.1f ms  ", live.exposure_left_us * 1e-3, live.exposure_right_us * 1e-3);
   }
-  if (live.send_error) append(text, "send error %+.1f us  ", micro(*live.send_error));
+  if (live.send_error) text += formatted("send error %+.1f us  ", micro(*live.send_error));
   if (live.tai_error) {
-    append(text, "TAI +-%.1f us  ", micro(*live.tai_error));
+    text += formatted("TAI +-%.1f us  ", micro(*live.tai_error));
   } else {
     text += "TAI unsynchronised  ";
   }
@@ -284,10 +275,10 @@ std::string live_text(const Live& live) {
 std::array<std::string, 2> status_text(const Status& s) {
   std::array<std::string, 2> text;
   const std::uint64_t up_s = s.uptime_ms / 1000;
-  append(text[0], "up %jud %02u:%02u:%02u", std::uintmax_t{up_s / 86400}, static_cast<unsigned>(up_s / 3600 % 24),
-         static_cast<unsigned>(up_s / 60 % 60), static_cast<unsigned>(up_s % 60));
+  text[0] += formatted("up %jud %02u:%02u:%02u", std::uintmax_t{up_s / 86400}, static_cast<unsigned>(up_s / 3600 % 24),
+                       static_cast<unsigned>(up_s / 60 % 60), static_cast<unsigned>(up_s % 60));
   const auto count = [&text](std::size_t line, const char* name, std::uint64_t value) {
-    append(text[line], " %s %ju", name, std::uintmax_t{value});
+    text[line] += formatted(" %s %ju", name, std::uintmax_t{value});
   };
   text[0] += "  pairs";
   count(0, "captured", s.pairs_captured);
@@ -300,11 +291,11 @@ std::array<std::string, 2> status_text(const Status& s) {
   count(0, "missing", s.outputs_missing);
   count(0, "overslept", s.outputs_overslept);
   text[0] += "  health " + health_names(s.health);
-  append(text[1], "compute %.1f %.1f %.1f ms  send error %u %u %u us (p50 p99 max)  allocations %ju",
-         s.compute_p50_us * 1e-3, s.compute_p99_us * 1e-3, s.compute_max_us * 1e-3, s.send_error_p50_us,
-         s.send_error_p99_us, s.send_error_max_us, std::uintmax_t{s.allocations});
-  append(text[1], "  buffers free at least %u of %u  shed %s", s.pair_buffers_free_low, s.pair_buffers,
-         effort_names(s.efforts_shed).c_str());
+  text[1] += formatted("compute %.1f %.1f %.1f ms  send error %u %u %u us (p50 p99 max)  allocations %ju",
+                       s.compute_p50_us * 1e-3, s.compute_p99_us * 1e-3, s.compute_max_us * 1e-3, s.send_error_p50_us,
+                       s.send_error_p99_us, s.send_error_max_us, std::uintmax_t{s.allocations});
+  text[1] += formatted("  buffers free at least %u of %u  shed %s", s.pair_buffers_free_low, s.pair_buffers,
+                       effort_names(s.efforts_shed).c_str());
   text[1] += "  dropped";
   count(1, "telemetry", s.telemetry_dropped + s.telemetry_failed);
   count(1, "recording", s.recordings_dropped);
@@ -338,15 +329,15 @@ struct RigView {
 };
 
 void append_target_row(std::string& text, const Target& t, float scale) {
-  append(text, "%6u  %-9s %7.1f", t.id, to_string(t.state), static_cast<double>(t.age_s));
+  text += formatted("%6u  %-9s %7.1f", t.id, to_string(t.state), static_cast<double>(t.age_s));
   if (t.has_depth) {
     const auto scaled = [scale](float value) { return static_cast<double>(value * scale); };
-    append(text, " %9.2f %9.2f %9.2f %9.2f %9.2f", scaled(t.position.x()), scaled(t.position.y()),
-           scaled(t.position.z()), scaled(t.distance), scaled(t.velocity.norm()));
+    text += formatted(" %9.2f %9.2f %9.2f %9.2f %9.2f", scaled(t.position.x()), scaled(t.position.y()),
+                      scaled(t.position.z()), scaled(t.distance), scaled(t.velocity.norm()));
   } else {
-    append(text, " %9s %9s %9s %9s %9s", "-", "-", "-", "-", "-");
+    text += formatted(" %9s %9s %9s %9s %9s", "-", "-", "-", "-", "-");
   }
-  append(text, " %11.2f", static_cast<double>(t.confidence));
+  text += formatted(" %11.2f", static_cast<double>(t.confidence));
 }
 
 /// "7 (3 forged, 4 replayed)".
@@ -378,17 +369,18 @@ class Screen {
       const Header& h = view.pair.header;
       const Unit unit(h);
       std::string head;
-      append(head, "rig %u  session %ju  pair %ju  %.1f pairs/s  latency %.1f ms  lost %ju  flags ", rig,
-             std::uintmax_t{h.session}, std::uintmax_t{h.ordinal}, view.rate(now), h.latency_ns * 1e-6,
-             std::uintmax_t{view.lost});
+      head += formatted("rig %u  session %ju  pair %ju  %.1f pairs/s  latency %.1f ms  lost %ju  flags ", rig,
+                        std::uintmax_t{h.session}, std::uintmax_t{h.ordinal}, view.rate(now), h.latency_ns * 1e-6,
+                        std::uintmax_t{view.lost});
       line(text, head + flag_names(h.flags));
       if (view.pair.live) line(text, "  " + live_text(*view.pair.live));
       if (view.status) {
         for (const std::string& one : status_text(*view.status)) line(text, "  " + one);
       }
       std::string columns;
-      append(columns, "%6s  %-9s %7s %7s[%s] %7s[%s] %7s[%s] %6s[%s] %5s[%s/s] %10s", "id", "state", "age[s]", "x",
-             unit.name(), "y", unit.name(), "z", unit.name(), "dist", unit.name(), "speed", unit.name(), "confidence");
+      columns += formatted("%6s  %-9s %7s %7s[%s] %7s[%s] %7s[%s] %6s[%s] %5s[%s/s] %10s", "id", "state", "age[s]", "x",
+                           unit.name(), "y", unit.name(), "z", unit.name(), "dist", unit.name(), "speed", unit.name(),
+                           "confidence");
       line(text, columns);
       std::size_t shown = 0;
       for (const Target& target : view.pair.targets) {
@@ -428,24 +420,24 @@ std::string plain_line(const Pair& pair, std::uint64_t lost) {
   const Header& h = pair.header;
   const Unit unit(h);
   std::string text;
-  append(text, "rig %u  pair %ju  latency %.1f ms  lost %ju  targets %zu", h.rig, std::uintmax_t{h.ordinal},
-         h.latency_ns * 1e-6, std::uintmax_t{lost}, pair.targets.size());
+  text += formatted("rig %u  pair %ju  latency %.1f ms  lost %ju  targets %zu", h.rig, std::uintmax_t{h.ordinal},
+                    h.latency_ns * 1e-6, std::uintmax_t{lost}, pair.targets.size());
   if (h.flags != 0) text += "  flags " + flag_names(h.flags);
   if (pair.live) text += "  " + live_text(*pair.live);
   for (const Target& t : pair.targets) {
-    append(text, "  | %u %s", t.id, to_string(t.state));
+    text += formatted("  | %u %s", t.id, to_string(t.state));
     if (t.has_depth) {
-      append(text, " %.2f %s %.2f %s/s", static_cast<double>(t.distance * unit.scale), unit.name(),
-             static_cast<double>(t.velocity.norm() * unit.scale), unit.name());
+      text += formatted(" %.2f %s %.2f %s/s", static_cast<double>(t.distance * unit.scale), unit.name(),
+                        static_cast<double>(t.velocity.norm() * unit.scale), unit.name());
     }
-    append(text, " %.2f", static_cast<double>(t.confidence));
+    text += formatted(" %.2f", static_cast<double>(t.confidence));
   }
   return text + '\n';
 }
 
 std::string plain_line(const Datagram& with_status) {
   std::string text;
-  append(text, "rig %u  status %ju  ", with_status.header.rig, std::uintmax_t{with_status.status_sequence});
+  text += formatted("rig %u  status %ju  ", with_status.header.rig, std::uintmax_t{with_status.status_sequence});
   const auto lines = status_text(*with_status.status);
   return text + lines[0] + "  " + lines[1] + '\n';
 }
@@ -571,7 +563,7 @@ int run_monitor(const MonitorArguments& arguments, std::ostream& out, std::ostre
   messages << trouble << std::flush;
   if (!timed_out) return trouble.empty() ? 0 : 1;
   std::string line;
-  append(line, "nothing valid received on %s for %g s", where.c_str(), arguments.timeout_s);
+  line += formatted("nothing valid received on %s for %g s", where.c_str(), arguments.timeout_s);
   line += receiver.counters().refused_total() == 0
               ? ": is a sender running, and does it send to this address?\n"
               : ", refused " + refused_text(receiver) +

@@ -30,9 +30,9 @@ namespace stereotrack::daemon {
 /// Three threads around one source, one pipeline, one publisher, one that writes recordings, and one that gives the
 /// cameras' pulses where there are any to give:
 ///
-///     capture: LiveSource -> PairOutlet -> FramePool -> frames: Pipeline -> OutcomeMailbox -> publisher:
-///     OutputSchedule
-///                                 └──────────── notices ────────────────────────────────────────┘  -> lines, sink
+///     capture:    LiveSource -> PairOutlet -> FramePool
+///     frames:         -> Pipeline -> OutcomeMailbox
+///     publisher:          -> OutputSchedule -> lines, sink        and notices, straight from capture
 ///
 /// It does not know where its parts come from: programs and tests make them. One owner, whose thread calls all of it.
 class Daemon {

@@ -3,11 +3,10 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <cstdarg>
 #include <cstdio>
 #include <utility>
 
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrackd/daemon.hpp"
 
 namespace stereotrack::daemon {
@@ -18,13 +17,13 @@ namespace {
 class Text {
  public:
   void family(const char* name, const char* type, const char* help) {
-    append("# HELP stereotrack_%s %s\n# TYPE stereotrack_%s %s\n", name, help, name, type);
+    text_ += formatted("# HELP stereotrack_%s %s\n# TYPE stereotrack_%s %s\n", name, help, name, type);
     name_ = name;
   }
   void value(const char* labels, std::uint64_t value) {
-    append("stereotrack_%s%s %llu\n", name_, labels, static_cast<unsigned long long>(value));
+    text_ += formatted("stereotrack_%s%s %llu\n", name_, labels, static_cast<unsigned long long>(value));
   }
-  void number(const char* labels, double value) { append("stereotrack_%s%s %.9g\n", name_, labels, value); }
+  void number(const char* labels, double value) { text_ += formatted("stereotrack_%s%s %.9g\n", name_, labels, value); }
   void counter(const char* name, const char* help, std::uint64_t value_now) {
     family(name, "counter", help);
     value("", value_now);
@@ -41,24 +40,18 @@ class Text {
   void quantiles(const std::string& label, const runtime::Histogram& histogram) {
     for (const double part : {0.5, 0.99, 0.999, 1.0}) {
       const std::uint64_t ns = part < 1 ? histogram.percentile_ns(part) : histogram.max_ns();
-      append("stereotrack_%s{%squantile=\"%g\"} %.9f\n", name_, label.c_str(), part, static_cast<double>(ns) * 1e-9);
+      text_ += formatted("stereotrack_%s{%squantile=\"%g\"} %.9f\n", name_, label.c_str(), part,
+                         static_cast<double>(ns) * 1e-9);
     }
     const std::string only = label.empty() ? "" : '{' + label.substr(0, label.size() - 1) + '}';
-    append("stereotrack_%s_sum%s %.9f\n", name_, only.c_str(), static_cast<double>(histogram.sum_ns()) * 1e-9);
-    append("stereotrack_%s_count%s %llu\n", name_, only.c_str(), static_cast<unsigned long long>(histogram.count()));
+    text_ +=
+        formatted("stereotrack_%s_sum%s %.9f\n", name_, only.c_str(), static_cast<double>(histogram.sum_ns()) * 1e-9);
+    text_ += formatted("stereotrack_%s_count%s %llu\n", name_, only.c_str(),
+                       static_cast<unsigned long long>(histogram.count()));
   }
   [[nodiscard]] std::string take() { return std::move(text_); }
 
  private:
-  [[gnu::format(printf, 2, 3)]] void append(const char* format, ...) {
-    char line[512];
-    va_list values;
-    va_start(values, format);
-    const int size = std::vsnprintf(line, sizeof line, format, values);
-    va_end(values);
-    if (size > 0) text_.append(line, std::min(static_cast<std::size_t>(size), sizeof line - 1));
-  }
-
   std::string text_;
   const char* name_ = "";
 };

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "drivers/capture/v4l2/v4l2.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrack/doctor/words.hpp"
 
 namespace stereotrack::doctor {
@@ -74,7 +75,7 @@ class Judge {
     std::string what = count_text(c.cores, "core");
     if (c.max_mhz > 0) what += " to " + std::to_string(c.max_mhz) + " MHz";
     if (!c.isolated.empty()) what += ", isolated " + c.isolated;
-    if (c.hottest_c) what += ", " + format("%.0f C", *c.hottest_c);
+    if (c.hottest_c) what += ", " + formatted("%.0f C", *c.hottest_c);
     const bool steady = std::all_of(c.governors.begin(), c.governors.end(),
                                     [](const std::string& governor) { return governor == "performance"; });
     if (steady) {
@@ -89,7 +90,7 @@ class Judge {
            "take a stronger power supply or a heat sink; bits 0-3 are now, 16-19 since power-on",
            "vcgencmd get_throttled");
     } else if (c.hottest_c.value_or(0) >= kHot_c) {
-      note("cpu", format("%.0f C: it will slow down by itself", *c.hottest_c), "cool it, and look again under load",
+      note("cpu", formatted("%.0f C: it will slow down by itself", *c.hottest_c), "cool it, and look again under load",
            "cat /sys/class/thermal/thermal_zone*/temp");
     }
   }
@@ -99,7 +100,7 @@ class Judge {
     std::string what = std::to_string(m.total_mb) + " MB, " + std::to_string(m.available_mb) + " free";
     if (m.cma_mb > 0) what += ", cma " + std::to_string(m.cma_mb);
     what += ", dma heaps " + (m.dma_heaps.empty() ? std::string("none") : joined(m.dma_heaps, " "));
-    if (f_.pipeline && f_.pipeline->memory_mb > 0) what += format(", pipeline %.0f MB", f_.pipeline->memory_mb);
+    if (f_.pipeline && f_.pipeline->memory_mb > 0) what += formatted(", pipeline %.0f MB", f_.pipeline->memory_mb);
     if (m.total_mb > 0 && m.available_mb < kLittleMemory_mb) {
       note("memory", what + ": little is left", "stop what takes it", "ps axo rss,comm --sort -rss | head");
     } else {
@@ -157,7 +158,7 @@ class Judge {
     std::string what = c.source.empty() ? "source not told" : c.source;
     if (!c.ptp.empty()) what += ", " + joined(c.ptp, " ");
     if (c.tai_error_us) {
-      ok("clock", what + format(", TAI within %.0f us", *c.tai_error_us));
+      ok("clock", what + formatted(", TAI within %.0f us", *c.tai_error_us));
     } else {
       note("clock", what + ": nobody sets it, or TAI - UTC is not known: telemetry has no absolute times",
            "let chrony keep it, with the line `leapsectz right/UTC` in /etc/chrony/chrony.conf",
@@ -292,22 +293,23 @@ class Judge {
         problem("capture", m.side + ": " + m.failure, {}, {});
         continue;
       }
-      const std::string what =
-          m.side + " " + m.delivers +
-          format(": %llu frames, jitter p99 %s max %s, arrive after p50 %s p99.9 %s",
-                 static_cast<unsigned long long>(m.frames), us_text(m.jitter.p99_us).c_str(),
-                 us_text(m.jitter.max_us).c_str(), us_text(m.delay.p50_us).c_str(), us_text(m.delay.p999_us).c_str());
+      const std::string what = m.side + " " + m.delivers +
+                               formatted(": %llu frames, jitter p99 %s max %s, arrive after p50 %s p99.9 %s",
+                                         static_cast<unsigned long long>(m.frames), us_text(m.jitter.p99_us).c_str(),
+                                         us_text(m.jitter.max_us).c_str(), us_text(m.delay.p50_us).c_str(),
+                                         us_text(m.delay.p999_us).c_str());
       const double expected = m.period_ms > 0 ? f_.seconds * 1e3 / m.period_ms : 0;
       if (m.delay.count > 0 && m.delay_min_us < 0) {
         note("capture", what + ": frames bear times after their arrival",
              "tell how long reading out takes, in the configuration", readout_text(m));
       } else if (m.damaged + m.lost + m.late > 0) {
         note("capture",
-             what + format(": %llu lost, %llu damaged, %llu without a buffer", static_cast<unsigned long long>(m.lost),
-                           static_cast<unsigned long long>(m.damaged), static_cast<unsigned long long>(m.late)),
+             what + formatted(": %llu lost, %llu damaged, %llu without a buffer",
+                              static_cast<unsigned long long>(m.lost), static_cast<unsigned long long>(m.damaged),
+                              static_cast<unsigned long long>(m.late)),
              "another USB port or cable, a smaller picture or a lower camera.fps", "sudo dmesg | tail");
       } else if (static_cast<double>(m.frames) < 0.8 * expected - 3) {
-        note("capture", what + format(": fewer than the %.0f that %.1f a second make", expected, 1e3 / m.period_ms),
+        note("capture", what + formatted(": fewer than the %.0f that %.1f a second make", expected, 1e3 / m.period_ms),
              "automatic exposure may take longer than a period in the dark: set it in the configuration",
              "camera.exposure_us = " + std::to_string(static_cast<long>(m.period_ms * 500)));
       } else if (m.jitter.p99_us > 0.1e3 * m.period_ms) {
@@ -327,8 +329,8 @@ class Judge {
   void sync() {
     if (!f_.pair || !f_.pair->phase_ms) return;
     const config::CameraConfig& camera = f_.configuration.camera;
-    std::string what = format("the right camera exposes %.2f ms after the left one", *f_.pair->phase_ms);
-    if (f_.pair->drift_ppm) what += format(", drifting by %.1f in a million", *f_.pair->drift_ppm);
+    std::string what = formatted("the right camera exposes %.2f ms after the left one", *f_.pair->phase_ms);
+    if (f_.pair->drift_ppm) what += formatted(", drifting by %.1f in a million", *f_.pair->drift_ppm);
     const double limit_ms = camera.skew_limit_ms > 0 ? camera.skew_limit_ms : 5;
     const bool drifts = std::abs(f_.pair->drift_ppm.value_or(0)) > 2;  // less is measuring
     if (std::abs(*f_.pair->phase_ms) > limit_ms || drifts) {
@@ -350,7 +352,7 @@ class Judge {
         (m.beside_pipeline ? ", beside the pipeline" : "");
     const double late_us = f_.configuration.latency.late_ms * 1e3;
     if (m.latency.max_us > late_us) {
-      note("wake-up", what + format(": over latency.late_ms = %g", late_us * 1e-3),
+      note("wake-up", what + formatted(": over latency.late_ms = %g", late_us * 1e-3),
            "grant the rights, take a PREEMPT_RT kernel, keep other work off this core; who holds it up",
            "sudo cyclictest -m -p 82 -D 60");
     } else {
@@ -384,12 +386,12 @@ class Judge {
       return;
     }
     const std::string what =
-        format("%dx%d %s %s: p50 %s p99 %s max %s of %.1f ms, on synthetic:eleven", m.width, m.height,
-               m.colour ? "colour" : "grey", m.stereo ? "stereo" : "mono", us_text(m.compute.p50_us).c_str(),
-               us_text(m.compute.p99_us).c_str(), us_text(m.compute.max_us).c_str(), m.period_ms);
+        formatted("%dx%d %s %s: p50 %s p99 %s max %s of %.1f ms, on synthetic:eleven", m.width, m.height,
+                  m.colour ? "colour" : "grey", m.stereo ? "stereo" : "mono", us_text(m.compute.p50_us).c_str(),
+                  us_text(m.compute.p99_us).c_str(), us_text(m.compute.max_us).c_str(), m.period_ms);
     if (m.compute.p99_us > m.period_ms * 1e3) {
       note("pipeline", what + ": pairs will be passed over", "smaller pictures or fewer of them, in the configuration",
-           format("camera.fps = %.1f", std::max(0.1, std::floor(8e6 / m.compute.p99_us) / 10)));
+           formatted("camera.fps = %.1f", std::max(0.1, std::floor(8e6 / m.compute.p99_us) / 10)));
     } else {
       ok("pipeline", what);
     }
@@ -398,17 +400,17 @@ class Judge {
   void latency() {
     if (!f_.latency) return;
     const LatencyVerdict& v = *f_.latency;
-    const std::string sum =
-        format("L = %.0f ms can be kept: arrival %.1f%s + compute %.1f + a quarter of it + wake-ups %.2f + lead %.1f",
-               v.achievable_ms, v.arrival_ms, v.arrival_is_assumed ? " (a period, assumed)" : "", v.compute_ms,
-               v.wake_ms, v.lead_ms);
+    const std::string sum = formatted(
+        "L = %.0f ms can be kept: arrival %.1f%s + compute %.1f + a quarter of it + wake-ups %.2f + lead %.1f",
+        v.achievable_ms, v.arrival_ms, v.arrival_is_assumed ? " (a period, assumed)" : "", v.compute_ms, v.wake_ms,
+        v.lead_ms);
     if (v.achievable_ms <= v.configured_ms) {
-      ok("latency", sum + format("; latency.output_ms = %g", v.configured_ms));
+      ok("latency", sum + formatted("; latency.output_ms = %g", v.configured_ms));
     } else if (f_.config.empty()) {
       ok("latency", sum + "; that is what --write writes");
     } else {
-      note("latency", sum + format("; latency.output_ms = %g is less: what leaves is predicted", v.configured_ms),
-           "in " + f_.config, format("latency.output_ms = %.1f", v.achievable_ms));
+      note("latency", sum + formatted("; latency.output_ms = %g is less: what leaves is predicted", v.configured_ms),
+           "in " + f_.config, formatted("latency.output_ms = %.1f", v.achievable_ms));
     }
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrack/doctor/words.hpp"
 
 namespace stereotrack::doctor {
@@ -74,7 +75,7 @@ std::vector<std::string> topics_of(const std::vector<Item>& items, Verdict verdi
 std::vector<std::string> head_of(const Findings& f) {
   std::string text = joined({f.host, f.kernel.board}, ", ") + ", user " + f.limits.user + "; " +
                      (f.config.empty() ? "no configuration: the cameras that there are" : f.config);
-  text += f.seconds > 0 ? format("; %g s each", f.seconds) : "; nothing measured";
+  text += f.seconds > 0 ? formatted("; %g s each", f.seconds) : "; nothing measured";
   return wrapped(f.program + " doctor: ", text);
 }
 
@@ -123,7 +124,7 @@ std::string report(const Findings& findings, const std::vector<Item>& items) {
   add(head);
   for (const auto& block : blocks) add(block);
   if (left_out > 0)
-    text += format("... and %zu more, for which there is no room: stereotrack doctor --json\n", left_out);
+    text += formatted("... and %zu more, for which there is no room: stereotrack doctor --json\n", left_out);
   add(end);
   return text;
 }

@@ -14,6 +14,7 @@
 #include "config/key.hpp"
 #include "config/load.hpp"
 #include "drivers/capture/libcamera/libcamera.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrack/doctor/words.hpp"
 
 namespace stereotrack::doctor {
@@ -126,7 +127,7 @@ void apply(const Delivery& delivery, config::CameraConfig& camera) {
 
 /// With a point, as the configuration wants numbers.
 std::string number_text(double value) {
-  std::string text = format("%.6g", value);
+  std::string text = formatted("%.6g", value);
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
   return text;
 }
@@ -241,13 +242,13 @@ std::string suggest(const Findings& f, const std::optional<std::string>& calibra
   const double drift = f.pair ? std::abs(f.pair->drift_ppm.value_or(0)) : 0;
   const double phase_ms = f.pair ? std::abs(f.pair->phase_ms.value_or(0)) : 0;
   if (has_two && (drift > 2 || phase_ms > camera.skew_limit_ms)) {
-    text += "# Nobody synchronises them: " + format("%.2f ms apart", phase_ms) + " now.\ntolerance = 0.5\n";
+    text += "# Nobody synchronises them: " + formatted("%.2f ms apart", phase_ms) + " now.\ntolerance = 0.5\n";
   }
   if (f.latency) {
     const LatencyVerdict& v = *f.latency;
     text += "\n[latency]\n# " +
-            format("Measured: arrival %.1f%s, compute %.1f and a quarter of it, wake-ups %.2f, lead %.1f ms.",
-                   v.arrival_ms, v.arrival_is_assumed ? " (assumed)" : "", v.compute_ms, v.wake_ms, v.lead_ms) +
+            formatted("Measured: arrival %.1f%s, compute %.1f and a quarter of it, wake-ups %.2f, lead %.1f ms.",
+                      v.arrival_ms, v.arrival_is_assumed ? " (assumed)" : "", v.compute_ms, v.wake_ms, v.lead_ms) +
             "\noutput_ms = " + number_text(std::clamp(v.achievable_ms, 1.0, 10'000.0)) + "\n";
   }
   if (has_two) {

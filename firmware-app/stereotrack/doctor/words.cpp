@@ -1,11 +1,9 @@
 #include "firmware-app/stereotrack/doctor/words.hpp"
+#include "firmware-app/formatted.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <string_view>
 
 namespace stereotrack::doctor {
@@ -23,15 +21,6 @@ double fastest(const CameraFacts::Size& size) {
 
 }  // namespace
 
-std::string format(const char* how, ...) {
-  std::array<char, 512> text{};
-  std::va_list values;
-  va_start(values, how);
-  (void)std::vsnprintf(text.data(), text.size(), how, values);
-  va_end(values);
-  return text.data();
-}
-
 std::string joined(const std::vector<std::string>& words, const std::string& between) {
   std::string all;
   for (const std::string& word : words) {
@@ -45,8 +34,8 @@ std::string count_text(int count, const std::string& what) {
 }
 
 std::string us_text(double us) {
-  if (std::abs(us) < 1000) return format("%.0f us", us);
-  return format(std::abs(us) < 10'000 ? "%.2f ms" : "%.1f ms", us * 1e-3);
+  if (std::abs(us) < 1000) return formatted("%.0f us", us);
+  return formatted(std::abs(us) < 10'000 ? "%.2f ms" : "%.1f ms", us * 1e-3);
 }
 
 const char* driver_name(config::CameraDriver driver) noexcept {
@@ -72,8 +61,8 @@ std::string formats_text(const CameraFacts& camera) {
   const std::size_t all = names.size();
   if (all > kMostFormats) names.resize(kMostFormats);
   std::string text = joined(names, " ") + (all > kMostFormats ? " ..." : "") +
-                     format(" to %dx%d", largest->max_width, largest->max_height);
-  if (fastest(*largest) > 0) text += format(" at %.4g/s", fastest(*largest));
+                     formatted(" to %dx%d", largest->max_width, largest->max_height);
+  if (fastest(*largest) > 0) text += formatted(" at %.4g/s", fastest(*largest));
   return text;
 }
 

@@ -10,7 +10,6 @@
 /// How things are put into words, for the report and for comments of a configuration.
 namespace stereotrack::doctor {
 
-[[nodiscard, gnu::format(printf, 1, 2)]] std::string format(const char* how, ...);
 /// Those that are not empty.
 [[nodiscard]] std::string joined(const std::vector<std::string>& words, const std::string& between);
 [[nodiscard]] std::string count_text(int count, const std::string& what);  ///< "1 core", "4 cores"
