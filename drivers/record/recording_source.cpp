@@ -31,19 +31,25 @@ std::string text_of(std::span<const std::byte> bytes) {
 }
 
 std::span<const std::byte> map_file(const std::string& path) {
+  const auto unreadable = [&](int error) {
+    return std::runtime_error(path + ": cannot be read: " + std::strerror(error) + "; check the path");
+  };
+  const auto too_large = [&] {
+    return std::runtime_error(path + ": larger than a program can address here; replay it on a 64-bit machine");
+  };
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno) + "; check the path");
+  if (file < 0) throw unreadable(errno);
   struct stat state {};
   const bool known = ::fstat(file, &state) == 0 && S_ISREG(state.st_mode);
   const auto bytes = known ? static_cast<std::uint64_t>(state.st_size) : 0;
   const auto size = static_cast<std::size_t>(bytes);  // of 32 bits on ARMv7
-  void* memory =
-      size != bytes || bytes < sizeof(FileHeader) ? MAP_FAILED : ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
+  const bool ours = bytes >= sizeof(FileHeader);
+  void* memory = !ours || size != bytes ? MAP_FAILED : ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
+  const int error = errno;
   ::close(file);
-  if (memory == MAP_FAILED && bytes >= sizeof(FileHeader)) {
-    throw std::runtime_error(path + ": larger than a program can address here; replay it on a 64-bit machine");
-  }
-  if (memory == MAP_FAILED) throw std::runtime_error(path + ": " + kNotOurs + "; give a .strec file of this program");
+  if (!ours) throw std::runtime_error(path + ": " + kNotOurs + "; give a .strec file of this program");
+  if (size != bytes || (memory == MAP_FAILED && error == ENOMEM)) throw too_large();
+  if (memory == MAP_FAILED) throw unreadable(error);
   return {static_cast<const std::byte*>(memory), size};
 }
 

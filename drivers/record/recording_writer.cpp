@@ -18,6 +18,7 @@ namespace stereotrack::record {
 bool RecordingWriter::open(const std::filesystem::path& path) noexcept {
   abandon();
   error_ = 0;
+  named_ = false;
   number_ = 0;
   bytes_ = 0;
   end_ = {};
@@ -87,6 +88,7 @@ bool RecordingWriter::commit() noexcept {
     ::unlink(part_.c_str());
     return false;
   }
+  named_ = true;
   if (!telemetry::sync_folder_of(path_)) error_ = errno;
   return error_ == 0;
 }
@@ -100,6 +102,11 @@ void RecordingWriter::abandon() noexcept {
 
 std::string RecordingWriter::status() const {
   if (error_ == 0) return {};
+  if (named_) {
+    return path_.string() +
+           ": written, but a power cut may lose it: its folder cannot be synced: " + std::strerror(error_) +
+           "; check the disk (record.directory)";
+  }
   return path_.string() + ": not written: " + std::strerror(error_) +
          (error_ == ENOSPC ? "; free space or choose another folder (record.directory)"
                            : "; check the folder (record.directory)");

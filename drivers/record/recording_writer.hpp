@@ -31,7 +31,8 @@ class RecordingWriter {
   /// What was written so far is on the disk. False: see status().
   bool flush() noexcept;
 
-  /// The end record; makes the file whole: on the disk, under its name. False: see status(), and nothing stays.
+  /// The end record; makes the file whole: on the disk, under its name. False: see status(); nothing stays, or the
+  /// whole file whose folder alone could not be synced.
   [[nodiscard]] bool commit() noexcept;
 
   /// Deletes what was written of an unfinished file.
@@ -49,6 +50,7 @@ class RecordingWriter {
   std::filesystem::path part_;
   int file_ = -1;
   int error_ = 0;
+  bool named_ = false;  // under its name, whole
   std::uint32_t number_ = 0;
   std::uint64_t bytes_ = 0;
   EndMeta end_;

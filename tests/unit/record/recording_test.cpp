@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <fstream>
 #include <numeric>
@@ -240,6 +241,40 @@ TEST(RecordingWriter, AFullDiskIsOneLineAndNothingStays) {
       << writer.status();
   writer.abandon();
   EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+/// No file more is opened while it lives.
+class NoMoreDescriptors {
+ public:
+  NoMoreDescriptors() {
+    EXPECT_EQ(::getrlimit(RLIMIT_NOFILE, &before_), 0);
+    const rlimit none{0, before_.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  }
+  ~NoMoreDescriptors() { EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &before_), 0); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST(RecordingWriter, AWholeFileWhoseFolderCannotBeSyncedIsKeptAndTold) {
+  const TempDir folder;
+  RecordingWriter writer;
+  ASSERT_TRUE(writer.open(folder / "x.strec"));
+  ASSERT_TRUE(writer.write(RecordKind::kFrame, frame_payload(1)));
+  {
+    const NoMoreDescriptors limit;
+    EXPECT_FALSE(writer.commit());
+  }
+  EXPECT_EQ(writer.status(), (folder / "x.strec").string() +
+                                 ": written, but a power cut may lose it: its folder cannot be synced: Too many open "
+                                 "files; check the disk (record.directory)");
+  writer.abandon();
+  EXPECT_TRUE(fs::exists(folder / "x.strec"));
+  EXPECT_FALSE(fs::exists(folder / "x.strec.part"));
+  // The next one says nothing of it.
+  ASSERT_TRUE(writer.open(folder / "y.strec"));
+  EXPECT_EQ(writer.status(), "");
 }
 
 TEST(RecordingWriter, AFolderThatIsNotThereIsOneLine) {
