@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "config/milliseconds.hpp"
 #include "config/schema.hpp"
 #include "config/zones.hpp"
 #include "drivers/record/output_note.hpp"
@@ -295,8 +296,7 @@ class Replay {
       publish_as_recorded(*rig_.recording, pair, result);
       return;
     }
-    const auto latency =
-        std::chrono::nanoseconds(static_cast<std::int64_t>(rig_.configuration().latency.output_ms * 1e6 + 0.5));
+    const auto latency = config::from_ms(rig_.configuration().latency.output_ms);
     telemetry::Message message;
     message.tracks = result.tracks;
     message.ordinal = pair.ordinal;

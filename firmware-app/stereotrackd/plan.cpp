@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "config/milliseconds.hpp"
 #include "config/schema.hpp"
 #include "config/zones.hpp"
 #include "drivers/telemetry/udp_sender.hpp"
@@ -73,7 +74,7 @@ void refuse_zones(const config::Configuration& running, const config::Configurat
 
 std::unique_ptr<Plan> make_plan(const config::Configuration& configuration, double unit_m, bool with_rules) {
   const config::LatencyConfig& latency = configuration.latency;
-  const std::chrono::nanoseconds stale_after(static_cast<std::int64_t>((latency.output_ms + latency.stale_ms) * 1e6));
+  const std::chrono::nanoseconds stale_after = config::from_ms(latency.output_ms + latency.stale_ms);
   gpio::LineBits zones = 0;
   for (std::size_t i = 0; i < configuration.signals.size(); ++i) {
     if (configuration.signals[i].when == config::SignalWhen::kInZone) zones |= gpio::LineBits{1} << i;
