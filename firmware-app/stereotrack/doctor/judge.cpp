@@ -338,7 +338,7 @@ class Judge {
            "wire a trigger (docs/CAMERAS.md); until then take what fits worst, in the configuration",
            "camera.tolerance = 0.5");
     } else {
-      ok("sync", what);
+      ok("sync", what + (f_.pair->drift_ppm ? "" : "; whether they drift shows after some seconds more: --seconds 10"));
     }
   }
 

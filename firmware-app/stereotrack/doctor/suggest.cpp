@@ -239,10 +239,15 @@ std::string suggest(const Findings& f, const std::optional<std::string>& calibra
     text += "# Without it frames bear times after their arrival.\nreadout_us = " +
             number_text(std::min(std::ceil(readout_us), 1e7)) + "\n";
   }
-  const double drift = f.pair ? std::abs(f.pair->drift_ppm.value_or(0)) : 0;
-  const double phase_ms = f.pair ? std::abs(f.pair->phase_ms.value_or(0)) : 0;
-  if (has_two && (drift > 2 || phase_ms > camera.skew_limit_ms)) {
-    text += "# Nobody synchronises them: " + formatted("%.2f ms apart", phase_ms) + " now.\ntolerance = 0.5\n";
+  if (has_two && f.pair) {
+    // Two that nobody synchronises may stand together by chance, and elsewhere at the next start.
+    const double phase_ms = std::abs(f.pair->phase_ms.value_or(0));
+    const std::string now = formatted("%.2f ms apart now", phase_ms);
+    if (!f.pair->drift_ppm) {
+      text += "# " + now + "; too short a time to see whether anything synchronises them.\ntolerance = 0.5\n";
+    } else if (std::abs(*f.pair->drift_ppm) > 2 || phase_ms > camera.skew_limit_ms) {
+      text += "# Nobody synchronises them: " + now + ".\ntolerance = 0.5\n";
+    }
   }
   if (f.latency) {
     const LatencyVerdict& v = *f.latency;

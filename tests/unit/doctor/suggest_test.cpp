@@ -162,6 +162,15 @@ TEST(Suggest, WhatTheCamerasLackIsMadeUpFor) {
   EXPECT_EQ(c.camera.readout_us, 17'667);
 }
 
+// They may stand together by chance, and half a period apart at the next start.
+TEST(Suggest, TwoWhoseDriftIsNotKnownArePairedWhereverTheyStand) {
+  Findings f = good_board();
+  f.pair = PairMeasure{.phase_ms = 0.5, .drift_ppm = std::nullopt};
+  EXPECT_EQ(loaded(suggest(f, "c.yml")).camera.tolerance, 0.5);
+  f.pair = PairMeasure{.phase_ms = 0.5, .drift_ppm = 0};
+  EXPECT_EQ(loaded(suggest(f, "c.yml")).camera.tolerance, 0.25);
+}
+
 TEST(Suggest, NamesTheDriverWhereItIsNotTheKernels) {
   Findings f = good_board();
   f.configuration.camera.driver = config::CameraDriver::kLibcamera;

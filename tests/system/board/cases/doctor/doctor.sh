@@ -44,10 +44,11 @@ fact "a scene brings a calibration" /payload/stereotrack synth eleven --out /run
 
 fact "it looks, and the exit code tells of limits" ends_with 1 looks
 fact "what it tells is one screen" screen
+release=$(uname -r | sed 's/[.+]/[&]/g')  # as a regular expression
 if [[ $(uname -v) == *PREEMPT_RT* ]]; then
-  fact "it names the kernel and its preemption" tells "^OK +kernel +$(uname -r) .*PREEMPT_RT"
+  fact "it names the kernel and its preemption" tells "^OK +kernel +$release .*PREEMPT_RT"
 else
-  fact "it names the kernel and its preemption" tells "^NOTE +kernel +$(uname -r) .*preemption voluntary"
+  fact "it names the kernel and its preemption" tells "^NOTE +kernel +$release .*preemption voluntary"
   fact "and the command for another one" tells 'sudo apt install linux-image-rt-arm64'
 fi
 fact "the first camera with its formats" tells '^OK +camera +/dev/video0 vivid, platform:vivid-000: .* grey8 '
