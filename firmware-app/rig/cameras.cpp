@@ -1,13 +1,13 @@
 #include "firmware-app/rig/cameras.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
 #include "config/error.hpp"
 #include "config/milliseconds.hpp"
 #include "drivers/capture/libcamera/libcamera.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/rig/trigger.hpp"
 
 namespace stereotrack {
@@ -35,10 +35,9 @@ void check_format(const config::Loaded& loaded) {
 }
 
 std::string line_of(Side side, const capture::CameraInfo& info) {
-  char rate[32];
-  (void)std::snprintf(rate, sizeof rate, "%.1f", 1.0 / std::chrono::duration<double>(info.period).count());
   return std::string(side == Side::kLeft ? "left" : "right") + " camera: " + info.name + ", " + info.model + ": " +
-         capture::delivery_text(info) + " at " + rate + " frames/s";
+         capture::delivery_text(info) +
+         formatted(" at %.1f frames/s", 1.0 / std::chrono::duration<double>(info.period).count());
 }
 
 }  // namespace

@@ -209,9 +209,8 @@ void append_status(std::string& json, const Status& s, std::uint64_t sequence) {
 /// `key_id`: of a datagram that was verified.
 std::string to_json(const Datagram& datagram, std::optional<std::uint32_t> key_id) {
   const Header& h = datagram.header;
-  std::string json;
-  json += formatted("{\"schema\":%u,\"rig\":%u,\"session\":%ju", telemetry::kSchemaVersion, h.rig,
-                    std::uintmax_t{h.session});
+  std::string json = formatted("{\"schema\":%u,\"rig\":%u,\"session\":%ju", telemetry::kSchemaVersion, h.rig,
+                               std::uintmax_t{h.session});
   if (key_id) json += formatted(",\"key_id\":%u", *key_id);
   if (datagram.status) {
     json += formatted(",\"send_time_ns\":%jd", std::intmax_t{h.send_time_ns});
@@ -368,19 +367,17 @@ class Screen {
     for (auto& [rig, view] : rigs) {
       const Header& h = view.pair.header;
       const Unit unit(h);
-      std::string head;
-      head += formatted("rig %u  session %ju  pair %ju  %.1f pairs/s  latency %.1f ms  lost %ju  flags ", rig,
-                        std::uintmax_t{h.session}, std::uintmax_t{h.ordinal}, view.rate(now), h.latency_ns * 1e-6,
-                        std::uintmax_t{view.lost});
+      std::string head = formatted("rig %u  session %ju  pair %ju  %.1f pairs/s  latency %.1f ms  lost %ju  flags ",
+                                   rig, std::uintmax_t{h.session}, std::uintmax_t{h.ordinal}, view.rate(now),
+                                   h.latency_ns * 1e-6, std::uintmax_t{view.lost});
       line(text, head + flag_names(h.flags));
       if (view.pair.live) line(text, "  " + live_text(*view.pair.live));
       if (view.status) {
         for (const std::string& one : status_text(*view.status)) line(text, "  " + one);
       }
-      std::string columns;
-      columns += formatted("%6s  %-9s %7s %7s[%s] %7s[%s] %7s[%s] %6s[%s] %5s[%s/s] %10s", "id", "state", "age[s]", "x",
-                           unit.name(), "y", unit.name(), "z", unit.name(), "dist", unit.name(), "speed", unit.name(),
-                           "confidence");
+      std::string columns = formatted("%6s  %-9s %7s %7s[%s] %7s[%s] %7s[%s] %6s[%s] %5s[%s/s] %10s", "id", "state",
+                                      "age[s]", "x", unit.name(), "y", unit.name(), "z", unit.name(), "dist",
+                                      unit.name(), "speed", unit.name(), "confidence");
       line(text, columns);
       std::size_t shown = 0;
       for (const Target& target : view.pair.targets) {
@@ -419,9 +416,9 @@ class Screen {
 std::string plain_line(const Pair& pair, std::uint64_t lost) {
   const Header& h = pair.header;
   const Unit unit(h);
-  std::string text;
-  text += formatted("rig %u  pair %ju  latency %.1f ms  lost %ju  targets %zu", h.rig, std::uintmax_t{h.ordinal},
-                    h.latency_ns * 1e-6, std::uintmax_t{lost}, pair.targets.size());
+  std::string text =
+      formatted("rig %u  pair %ju  latency %.1f ms  lost %ju  targets %zu", h.rig, std::uintmax_t{h.ordinal},
+                h.latency_ns * 1e-6, std::uintmax_t{lost}, pair.targets.size());
   if (h.flags != 0) text += "  flags " + flag_names(h.flags);
   if (pair.live) text += "  " + live_text(*pair.live);
   for (const Target& t : pair.targets) {
@@ -436,8 +433,8 @@ std::string plain_line(const Pair& pair, std::uint64_t lost) {
 }
 
 std::string plain_line(const Datagram& with_status) {
-  std::string text;
-  text += formatted("rig %u  status %ju  ", with_status.header.rig, std::uintmax_t{with_status.status_sequence});
+  std::string text =
+      formatted("rig %u  status %ju  ", with_status.header.rig, std::uintmax_t{with_status.status_sequence});
   const auto lines = status_text(*with_status.status);
   return text + lines[0] + "  " + lines[1] + '\n';
 }
@@ -562,8 +559,7 @@ int run_monitor(const MonitorArguments& arguments, std::ostream& out, std::ostre
   const std::string trouble = marks.save();
   messages << trouble << std::flush;
   if (!timed_out) return trouble.empty() ? 0 : 1;
-  std::string line;
-  line += formatted("nothing valid received on %s for %g s", where.c_str(), arguments.timeout_s);
+  std::string line = formatted("nothing valid received on %s for %g s", where.c_str(), arguments.timeout_s);
   line += receiver.counters().refused_total() == 0
               ? ": is a sender running, and does it send to this address?\n"
               : ", refused " + refused_text(receiver) +
