@@ -157,7 +157,8 @@ class LiveSource {
   [[nodiscard]] virtual const std::string& failure() const noexcept = 0;
 
   /// Service thread, about every 0.1 s while the capture thread runs: what waits or takes memory, such as opening a
-  /// device anew. May take its time; throws nothing. Adds to `notes` what the log is to say.
+  /// device anew. May take the time that one device needs for that; throws nothing. Adds to `notes` what the log is to
+  /// say.
   virtual void tend(std::vector<SourceNote>& notes) { (void)notes; }
 
   /// Any thread. Each figure is right by itself.

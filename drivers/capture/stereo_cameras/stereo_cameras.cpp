@@ -679,16 +679,16 @@ void StereoCameras::say(const Event& event, std::vector<SourceNote>& notes) {
 }
 
 /// Destroys a camera that was given up, and says why it was.
-void StereoCameras::bury(Side side, std::vector<SourceNote>& notes) {
+bool StereoCameras::bury(Side side, std::vector<SourceNote>& notes) {
   Eye& each = eye(side);
   const std::unique_ptr<Camera> dead(each.retired.exchange(nullptr, std::memory_order_acquire));
-  if (!dead) return;
+  if (!dead) return false;
   each.serves = nullptr;
   phase_.restart();
   each.is_wanted = true;
   each.next_try = now() + each.back_off;
   each.back_off_ms.set(static_cast<std::uint64_t>(each.back_off.count() / 1'000'000));
-  if (!each.retired_was_heard) return;  // it had not come back: nothing has changed
+  if (!each.retired_was_heard) return true;  // it had not come back: nothing has changed
   const bool silent = each.retired_silence.count() > 0;
   const std::string why = silent ? dead->info().name + ": no frame for " + seconds_text(each.retired_silence) +
                                        ": check its cable, supply and trigger"
@@ -697,11 +697,12 @@ void StereoCameras::bury(Side side, std::vector<SourceNote>& notes) {
                    std::string(name_of(side)) + " camera: " + why +
                        (side == Side::kRight ? "; goes on in mono and tries to open it again"
                                              : "; outputs are predicted until it is open again")});
+  return true;
 }
 
-void StereoCameras::reopen(Side side, std::vector<SourceNote>& notes) {
+bool StereoCameras::reopen(Side side, std::vector<SourceNote>& notes) {
   Eye& each = eye(side);
-  if (!each.is_wanted || now() < each.next_try) return;
+  if (!each.is_wanted || now() < each.next_try) return false;
   std::string wrong;
   try {
     std::unique_ptr<Camera> camera = open_(side);
@@ -722,14 +723,15 @@ void StereoCameras::reopen(Side side, std::vector<SourceNote>& notes) {
   }
   // Kept until a frame comes: a camera that opens and stays silent is not opened without end.
   each.back_off = std::min(2 * each.back_off, config_.back_off_most);
-  if (wrong.empty()) return;
+  if (wrong.empty()) return true;
   each.open_failures.add();
   each.next_try = now() + each.back_off;
   each.back_off_ms.set(static_cast<std::uint64_t>(each.back_off.count() / 1'000'000));
-  if (wrong == each.last_refusal) return;
+  if (wrong == each.last_refusal) return true;
   each.last_refusal = wrong;
   notes.push_back({SourceNote::Weight::kWarning, "camera_open", name_of(side),
                    std::string(name_of(side)) + " camera: " + wrong + "; tries again"});
+  return true;
 }
 
 void StereoCameras::estimate_phase() noexcept {
@@ -839,9 +841,10 @@ void StereoCameras::tend(std::vector<SourceNote>& notes) {
   Event event;
   while (events_.pop(event)) say(event, notes);
   estimate_phase();
+  // A device that is slow keeps each of these for seconds: one a call, so that the caller comes to its signals, and to
+  // its watchdog, between them.
   for (const Side side : kSides) {
-    bury(side, notes);
-    reopen(side, notes);
+    if (bury(side, notes) || reopen(side, notes)) break;
   }
   steer(notes);
   if (!trigger_) return;

@@ -221,8 +221,9 @@ class StereoCameras final : public LiveSource {
   void count() noexcept;
 
   // Service thread.
-  void bury(Side side, std::vector<SourceNote>& notes);
-  void reopen(Side side, std::vector<SourceNote>& notes);
+  /// These may wait for the device. False: there was nothing to do.
+  bool bury(Side side, std::vector<SourceNote>& notes);
+  bool reopen(Side side, std::vector<SourceNote>& notes);
   void say(const Event& event, std::vector<SourceNote>& notes);
   void estimate_phase() noexcept;
   void steer(std::vector<SourceNote>& notes);

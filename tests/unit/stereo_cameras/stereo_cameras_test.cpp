@@ -315,9 +315,32 @@ TEST(StereoCameras, ADeadCameraIsKeptWhileALeaseReadsItsBuffer) {
   EXPECT_EQ(number_of(lease->right), 1U);
   lease.release();
   rig.step();
-  (void)rig.tend();
+  for (int side = 0; side < 2; ++side) (void)rig.tend();
   EXPECT_FALSE(rig.right.is_open());
   EXPECT_EQ(rig.right.lost_in_closing(), 0);
+}
+
+// Each keeps the service thread for as long as its device takes: signals and the watchdog have their turn between.
+TEST(StereoCameras, TwoThatAreLostAtOnceAreClosedAndOpenedOneACall) {
+  CameraRig rig(config());
+  rig.open();
+  EXPECT_EQ(play(rig, 1, 10).size(), 10U);
+  rig.left.lose();
+  rig.right.lose();
+  for (int i = 0; i < 3; ++i) rig.step();
+  const auto open = [&] { return (rig.left.is_open() ? 1 : 0) + (rig.right.is_open() ? 1 : 0); };
+  const auto opened = [&] { return rig.left.opened() + rig.right.opened(); };
+  ASSERT_EQ(open(), 2);
+  for (int calls = 1; calls <= 2; ++calls) {
+    (void)rig.tend();
+    EXPECT_EQ(open(), 2 - calls);
+  }
+  const int first = opened();
+  rig.advance(std::chrono::seconds(5));
+  for (int calls = 1; calls <= 2; ++calls) {
+    (void)rig.tend();
+    EXPECT_EQ(opened(), first + calls);
+  }
 }
 
 TEST(StereoCameras, OneSilentSideIsGivenUpAndOpenedAnew) {

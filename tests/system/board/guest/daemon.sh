@@ -47,6 +47,12 @@ ${3:-}
 END
 }
 
+# NUMBER: some ten frames a second. Else vimc's sensors are as fast as the emulated CPU lets them be, which then has no
+# time left for anybody else.
+slow_down_vimc() {
+  local sensor
+  sensor=$(media-ctl -d "platform:vimc.$1" -e "Sensor B") && v4l2-ctl -d "$sensor" -c vertical_blanking=3000
+}
 # [SYSTEMD-RUN OPTION...]
 start() {
   rm -f "$figures"

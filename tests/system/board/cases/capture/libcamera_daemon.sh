@@ -48,12 +48,7 @@ v4l2_starts_without() {
     --set camera.driver=v4l2 --set camera.left.device=/dev/video0 --set camera.right.device= --set calibration.file= \
     --set camera.width=320 --set camera.format=grey8
 }
-# Its sensors are as fast as the emulated CPU lets them be, which then has no time left for anybody else.
-slow_down() {
-  local sensor
-  sensor=$(media-ctl -d "platform:vimc.$1" -e "Sensor B") && v4l2-ctl -d "$sensor" -c vertical_blanking=3000
-}
-plug_in() { echo vimc.1 >/sys/bus/platform/drivers/vimc/bind && udevadm settle && slow_down 1; }
+plug_in() { echo vimc.1 >/sys/bus/platform/drivers/vimc/bind && udevadm settle && slow_down_vimc 1; }
 unplug() { echo vimc.1 >/sys/bus/platform/drivers/vimc/unbind; }
 paired='stereotrack_pairing_total{verdict="paired"}'
 
@@ -62,7 +57,7 @@ fact "and cameras of the kernel's are opened all the same" v4l2_starts_without
 fact "both cameras can do what is asked of them" check
 check 2>&1 | tell
 
-fact "both are at some ten frames a second" eval "slow_down 0 && slow_down 1"
+fact "both are at some ten frames a second" eval "slow_down_vimc 0 && slow_down_vimc 1"
 fact "the daemon starts on both" start --setenv=STEREOTRACK_MODULE_PATH=/payload
 fact "pairs come" eventually over "$paired" 5
 fact "the capture thread asked the heap for nothing" test "$(figure 'stereotrack_allocations_total{thread="capture"}')" = 0
