@@ -6,10 +6,13 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/stereotrackd/log.hpp"
@@ -96,20 +99,8 @@ void Service::feed_watchdog(const Daemon& daemon) {
   (void)sd_notify(0, "WATCHDOG=1");
 }
 
-void Service::log_changes(const Daemon& daemon) {
+void Service::log_changes(const Daemon& daemon, bool last) {
   const Vitals& vitals = daemon.vitals();
-  const auto changed = [](std::uint64_t& seen, std::uint64_t now) {
-    const std::uint64_t by = now - seen;
-    seen = now;
-    return by;
-  };
-  for (std::size_t i = 0; i < kScheduleCounters.size(); ++i) {
-    const std::uint64_t by = changed(schedule_[i], vitals.schedule[i].get());
-    const std::string name = kScheduleCounters[i].name;
-    if (by == 0 || name == "on_time") continue;
-    log(LogLevel::kWarning, "outputs: " + std::to_string(by) + ' ' + name + " in the last second",
-        {{"STEREOTRACK_CAUSE", name}, {"STEREOTRACK_COUNT", std::to_string(by)}});
-  }
   if (const std::uint64_t now = vitals.efforts_left_out.get(); now != efforts_) {
     efforts_ = now;
     log(LogLevel::kNotice, "frames leave out: " + efforts_text(now), {{"STEREOTRACK_CAUSE", "effort"}});
@@ -130,36 +121,46 @@ void Service::log_changes(const Daemon& daemon) {
       "cameras: what moves tells that left and right pictures are of different instants; is a frame lost on its way?",
       "cameras: left and right pictures are of one instant again");
   health_ = health;
-  if (const std::uint64_t by = changed(allocations_, vitals.allocations()); by > 0) {
-    log(LogLevel::kError, std::to_string(by) + " heap calls in real-time threads", {{"STEREOTRACK_CAUSE", "heap"}});
-  }
-  if (const std::uint64_t by = changed(telemetry_failed_, vitals.telemetry_failed.get()); by > 0) {
-    log(LogLevel::kWarning, std::to_string(by) + " datagrams found no way in the last second",
-        {{"STEREOTRACK_CAUSE", "telemetry"}});
-  }
-  if (const trigger::PulseTrain* train = daemon.train()) {
-    if (const std::uint64_t by = changed(pulses_skipped_, train->counters().skipped.get()); by > 0) {
-      log(LogLevel::kWarning,
-          "trigger: " + std::to_string(by) + " pulses in the last second were slept over and are skipped",
-          {{"STEREOTRACK_CAUSE", "trigger"}, {"STEREOTRACK_COUNT", std::to_string(by)}});
+  if (const record::BlackBox* box = daemon.black_box()) {
+    const std::uint64_t recordings = box->counters().recordings.load();
+    if (const std::uint64_t by = recordings - std::exchange(recordings_, recordings); by > 0) {
+      log(LogLevel::kNotice, std::to_string(by) + " recording written", {{"STEREOTRACK_CAUSE", "record"}});
     }
+  }
+  log_counts(daemon, last);
+}
+
+void Service::log_counts(const Daemon& daemon, bool last) {
+  const MonotonicTime now = runtime::monotonic_now();
+  const auto log_count = [&](PacedCount& paced, std::uint64_t total, LogLevel level, const char* before,
+                             const char* what, const char* cause) {
+    const auto told = paced.tell(total, now, last);
+    if (!told) return;
+    const std::string count = std::to_string(told->count);
+    const auto seconds = std::llround(std::chrono::duration<double>(told->span).count());
+    const std::string span = seconds > 1 ? std::to_string(seconds) + " s" : "second";
+    log(level, std::string(before) + count + ' ' + what + " in the last " + span,
+        {{"STEREOTRACK_CAUSE", cause}, {"STEREOTRACK_COUNT", count}});
+  };
+  const Vitals& vitals = daemon.vitals();
+  for (std::size_t i = 0; i < kScheduleCounters.size(); ++i) {
+    const char* const name = kScheduleCounters[i].name;
+    if (std::string_view(name) == "on_time") continue;
+    log_count(schedule_[i], vitals.schedule[i].get(), LogLevel::kWarning, "outputs: ", name, name);
+  }
+  log_count(allocations_, vitals.allocations(), LogLevel::kError, "", "heap calls in real-time threads", "heap");
+  log_count(telemetry_failed_, vitals.telemetry_failed.get(), LogLevel::kWarning, "", "datagrams found no way",
+            "telemetry");
+  log_count(frames_refused_, vitals.frames_refused.get(), LogLevel::kError, "", "pairs were refused by the pipeline",
+            "pipeline");
+  if (const trigger::PulseTrain* train = daemon.train()) {
+    log_count(pulses_skipped_, train->counters().skipped.get(), LogLevel::kWarning,
+              "trigger: ", "pulses were slept over and skipped", "trigger");
   }
   if (const record::BlackBox* box = daemon.black_box()) {
     const record::BlackBox::Counters& counters = box->counters();
-    const std::uint64_t written = changed(recordings_, counters.recordings.load());
-    if (written > 0) {
-      log(LogLevel::kNotice, std::to_string(written) + " recording written", {{"STEREOTRACK_CAUSE", "record"}});
-    }
-    const std::uint64_t lost =
-        changed(recordings_lost_, counters.recordings_failed.load() + counters.triggers_dropped.load());
-    if (lost > 0) {
-      log(LogLevel::kWarning, std::to_string(lost) + " recordings were dropped, one was being written, or failed",
-          {{"STEREOTRACK_CAUSE", "record"}});
-    }
-  }
-  if (const std::uint64_t by = changed(frames_refused_, vitals.frames_refused.get()); by > 0) {
-    log(LogLevel::kError, std::to_string(by) + " pairs were refused by the pipeline in the last second",
-        {{"STEREOTRACK_CAUSE", "pipeline"}});
+    log_count(recordings_lost_, counters.recordings_failed.load() + counters.triggers_dropped.load(),
+              LogLevel::kWarning, "", "recordings were dropped, for one was being written, or failed", "record");
   }
 }
 
@@ -191,7 +192,7 @@ void Service::log_targets(Daemon& daemon) {
   }
 }
 
-void Service::every_second(Daemon& daemon) {
+void Service::every_second(Daemon& daemon, bool last) {
   target_lines_ = 0;
   log_targets(daemon);
   const std::uint64_t left_out = daemon.target_notes().left_out();
@@ -202,7 +203,7 @@ void Service::every_second(Daemon& daemon) {
         {{"STEREOTRACK_CAUSE", "target"}, {"STEREOTRACK_COUNT", std::to_string(targets_not_told_)}});
     targets_not_told_ = 0;
   }
-  log_changes(daemon);
+  log_changes(daemon, last);
   const Vitals& vitals = daemon.vitals();
   (void)sd_notifyf(0, "STATUS=%s; %llu pairs, %llu targets, compute p99 %.1f ms, send error p99 %.0f us, health %llu",
                    config_.summary.c_str(), static_cast<unsigned long long>(vitals.frames.get()),
@@ -244,7 +245,7 @@ void Service::run(Daemon& daemon) {
   }
   (void)sd_notify(0, "STOPPING=1");
   const bool stopped = daemon.stop();
-  every_second(daemon);
+  every_second(daemon, true);
   if (!stopped) {
     // Nothing can end a write that hangs but the end of the process; all that matters has ended already.
     log(LogLevel::kWarning, "a recording hangs in its write and is lost: is the disk alive?",

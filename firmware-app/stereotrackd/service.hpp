@@ -12,6 +12,7 @@
 #include "firmware-app/runtime/output_schedule.hpp"
 #include "firmware-app/stereotrackd/daemon.hpp"
 #include "firmware-app/stereotrackd/metrics_server.hpp"
+#include "firmware-app/stereotrackd/paced_count.hpp"
 
 namespace stereotrack::daemon {
 
@@ -47,8 +48,10 @@ class Service {
 
   /// False: it is time to go.
   [[nodiscard]] bool take_signals();
-  void every_second(Daemon& daemon);
-  void log_changes(const Daemon& daemon);
+  /// `last`: the daemon ends, so nothing waits for a later line.
+  void every_second(Daemon& daemon, bool last = false);
+  void log_changes(const Daemon& daemon, bool last);
+  void log_counts(const Daemon& daemon, bool last);
   void tend(Daemon& daemon);
   void log_targets(Daemon& daemon);
   void feed_watchdog(const Daemon& daemon);
@@ -60,18 +63,18 @@ class Service {
   std::optional<std::chrono::microseconds> watchdog_;
   Clock::time_point fed_{};
   std::array<std::uint64_t, 4> beats_{};
-  std::array<std::uint64_t, kScheduleCounters.size()> schedule_{};
+  std::array<PacedCount, kScheduleCounters.size()> schedule_{};
   int target_lines_ = 0;  // of this second
   std::uint64_t targets_not_told_ = 0;
   std::uint64_t target_notes_left_out_ = 0;
   std::uint64_t efforts_ = 0;
   std::uint64_t health_ = 0;
-  std::uint64_t allocations_ = 0;
-  std::uint64_t telemetry_failed_ = 0;
-  std::uint64_t frames_refused_ = 0;
-  std::uint64_t pulses_skipped_ = 0;
+  PacedCount allocations_;
+  PacedCount telemetry_failed_;
+  PacedCount frames_refused_;
+  PacedCount pulses_skipped_;
+  PacedCount recordings_lost_;
   std::uint64_t recordings_ = 0;
-  std::uint64_t recordings_lost_ = 0;
 };
 
 }  // namespace stereotrack::daemon
