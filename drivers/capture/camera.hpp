@@ -42,6 +42,9 @@ struct CameraInfo {
   std::chrono::nanoseconds period{0};  ///< nominal time between frames, as the driver keeps it
   std::size_t buffers = 0;             ///< that the driver and we pass to and fro
   bool counts_lost = false;            ///< SensorFrame::sequence counts frames that were lost, too
+  /// From the end of an exposure to the end of its frame, where times are told from the latter; else empty.
+  std::optional<std::chrono::nanoseconds> readout = {};
+  bool readout_is_guessed = false;  ///< nobody tells it
 };
 
 /// What a frame was exposed with, as far as the driver tells.

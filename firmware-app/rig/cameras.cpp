@@ -89,12 +89,17 @@ capture::StereoCameras::Config pairing_config(const config::Configuration& confi
 }
 
 capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
-                                           std::function<void(const std::string&)> say) {
-  return [camera, say = std::move(say)](Side side) {
+                                           std::function<void(const std::string&)> say, MissingReadout missing) {
+  return [camera, say = std::move(say), missing](Side side) {
     std::vector<std::string> notes;
-    std::unique_ptr<capture::Camera> opened = is_libcamera(camera)
-                                                  ? capture::libcamera::open(camera_settings(camera, side), &notes)
-                                                  : capture::v4l2::open(v4l2_settings(camera, side), &notes);
+    std::unique_ptr<capture::Camera> opened;
+    if (is_libcamera(camera)) {
+      opened = capture::libcamera::open(camera_settings(camera, side), &notes);
+    } else {
+      capture::v4l2::Settings settings = v4l2_settings(camera, side);
+      settings.guesses_readout = missing == MissingReadout::kGuessed;
+      opened = capture::v4l2::open(settings, &notes);
+    }
     for (const std::string& note : notes) say(note);
     return opened;
   };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -22,10 +23,17 @@ inline constexpr std::string_view kCameras = "cameras";
 /// How two of them become pairs.
 [[nodiscard]] capture::StereoCameras::Config pairing_config(const config::Configuration& configuration);
 
+/// What becomes of a camera that wants camera.readout_us, which is not set.
+enum class MissingReadout : std::uint8_t {
+  kRefused,
+  kGuessed,  ///< for who measures: CameraInfo::readout_is_guessed
+};
+
 /// Opens the camera of a side as camera.* says, now and each time that it was lost. `say`, which may be called by the
 /// thread that opens, is told what the driver made of the wish; it must outlive what is returned.
 [[nodiscard]] capture::StereoCameras::Open camera_opener(const config::CameraConfig& camera,
-                                                         std::function<void(const std::string&)> say);
+                                                         std::function<void(const std::string&)> say,
+                                                         MissingReadout missing = MissingReadout::kRefused);
 
 /// Opens and starts the cameras. Throws config::Error (the keys), or std::runtime_error naming the device. `trigger`:
 /// what tells of pulses, of open_trigger(); null: nobody.

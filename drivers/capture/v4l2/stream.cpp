@@ -9,7 +9,8 @@
 namespace stereotrack::capture::v4l2 {
 namespace {
 
-StampKind stamp_kind(std::uint32_t flags, const Stream::Parts& parts, std::vector<std::string>& notes) {
+/// Fills what parts.info says of the readout.
+StampKind stamp_kind(std::uint32_t flags, Stream::Parts& parts, std::vector<std::string>& notes) {
   StampKind kind;
   kind.by_arrival = (flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   const bool at_start = (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
@@ -20,13 +21,15 @@ StampKind stamp_kind(std::uint32_t flags, const Stream::Parts& parts, std::vecto
         "time that this takes");
   }
   if (kind.at == StampedAt::kStartOfExposure) return kind;
-  kind.readout = parts.readout ? *parts.readout : parts.readout_guess;
-  if (!parts.readout) {
-    notes.push_back(
-        "its stamps are the ends of frames, and nobody tells how long a frame takes to read out: taken for " +
-        std::to_string(kind.readout.count() / 1000) +
-        " us, the shortest time between frames; measure it and set readout_us");
+  parts.info.readout_is_guessed = !parts.readout;
+  if (parts.info.readout_is_guessed && !parts.guesses_readout) {
+    refuse(parts.info.name,
+           "its stamps are the ends of frames, and its driver does not tell how long the sensor takes to read one out: "
+           "set camera.readout_us, from the sensor's data sheet or by stereotrack doctor; it is at most some " +
+               std::to_string(parts.most_readout.count() / 1000) + " us, the shortest time between frames");
   }
+  kind.readout = parts.readout.value_or(parts.most_readout);
+  parts.info.readout = kind.readout;
   return kind;
 }
 

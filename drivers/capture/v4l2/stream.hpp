@@ -96,7 +96,8 @@ class Stream final : public Camera {
     Memory memory = Memory::kMapped;
     std::string heap;
     std::optional<std::chrono::nanoseconds> readout;  ///< configured, or told by the driver
-    std::chrono::nanoseconds readout_guess{0};        ///< else
+    std::chrono::nanoseconds most_readout{0};         ///< the shortest period: sensors are as fast as they can be read
+    bool guesses_readout = false;                     ///< that is taken where the former is required and missing
   };
   /// `notes` gets what is to be told about its stamps. Throws std::runtime_error, one line.
   Stream(Parts parts, std::vector<std::string>& notes);

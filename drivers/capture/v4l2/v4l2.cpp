@@ -96,7 +96,8 @@ std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>*
     parts.readout = from_us(timing.line.count() * timing.rows);
   }
   const auto shortest = shortest_period(parts.node, fourcc, layout.frame_width, layout.frame_height);
-  parts.readout_guess = std::min(*period, shortest ? *shortest : *period);
+  parts.most_readout = std::min(*period, shortest ? *shortest : *period);
+  parts.guesses_readout = settings.guesses_readout;
 
   parts.info.name = name;
   parts.info.model = (sensor ? sensor->name : node.card) + ", " + node.bus;

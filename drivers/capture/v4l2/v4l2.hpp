@@ -19,13 +19,14 @@ enum class Memory : std::uint8_t {
   kImported,  ///< dma-bufs of Settings::heap, which the device writes to, with the same around each lease
 };
 
-/// device: /dev/video0, a link to it (/dev/v4l/by-path/...), bus:platform:vivid-000, name:CARD. readout_us: where the
-/// driver stamps the end of a frame; not said: see stamp_notes below.
+/// device: /dev/video0, a link to it (/dev/v4l/by-path/...), bus:platform:vivid-000, name:CARD. readout_us: required
+/// where the driver stamps the end of a frame and cannot tell how long the sensor takes to read it out.
 struct Settings : CameraSettings {
   std::string sensor;  ///< where the driver has the program connect the camera's parts (media controller): the sensor's
                        ///< name, or how it begins. Empty: the one that is connected, or the nearest
   std::optional<int> black_level;  ///< in the driver's own unit
   int control_delay_frames = 2;    ///< from a change of a control to the first frame that was exposed with it
+  bool guesses_readout = false;    ///< for who measures: the shortest period is taken where it is required and missing
   Memory memory = Memory::kMapped;
   std::string heap;  ///< of kImported: a dma-heap of the kernel's, /dev/dma_heap/system, or /dev/udmabuf: memory of the
                      ///< process. A device that wants its memory in one piece takes linux,cma or reserved alone
@@ -33,13 +34,12 @@ struct Settings : CameraSettings {
 
 /// Opens and sets up one sensor; start() makes it stream.
 /// Throws std::runtime_error with one line that names the device and the way out: none or several of that name (and
-/// which there are), no permission, busy, not a camera, a size, format or number of buffers that cannot be had.
+/// which there are), no permission, busy, not a camera, a size, format or number of buffers that cannot be had, no
+/// readout_us where it is required.
 /// `notes`: what the driver made of the wish where that is no reason to stop, one line each, with the device's name:
 ///   * controls that it lacks, refused or clamped, and another frame rate;
 ///   * stamps. CLOCK_MONOTONIC at the start of an exposure or the end of a frame is what the driver should promise.
-///     Where it promises no clock, frames are stamped as they are taken. Where the stamp is the end of the frame and
-///     neither the driver nor `readout_us` tells how long reading out takes, the shortest period that the driver offers
-///     for the size is taken for it: sensors are as fast as they can be read. All told here.
+///     Where it promises no clock, frames are stamped as they are taken, which is told here.
 [[nodiscard]] std::unique_ptr<Camera> open(const Settings& settings, std::vector<std::string>* notes = nullptr);
 
 /// What one device is and offers, for people.

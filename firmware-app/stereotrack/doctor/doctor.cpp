@@ -106,7 +106,8 @@ class Doctor {
       }
       std::array<std::vector<std::string>, 2> notes;
       std::size_t side_opened = 0;
-      const auto open = camera_opener(c.camera, [&](const std::string& note) { notes[side_opened].push_back(note); });
+      const auto open = camera_opener(
+          c.camera, [&](const std::string& note) { notes[side_opened].push_back(note); }, MissingReadout::kGuessed);
       CaptureMeasures measures = measure_capture(
           [&](trigger::Side side) {
             side_opened = side == trigger::Side::kLeft ? 0 : 1;

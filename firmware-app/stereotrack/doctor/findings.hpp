@@ -106,7 +106,9 @@ struct CaptureMeasure {
   std::string name;      ///< CameraInfo's
   std::string delivers;  ///< 640x480 grey8
   bool colour = true;
-  double period_ms = 0;  ///< nominal
+  double period_ms = 0;                   ///< nominal
+  std::optional<double> readout_us = {};  ///< CameraInfo's
+  bool readout_is_guessed = false;
   std::uint64_t frames = 0;
   std::uint64_t damaged = 0;
   std::uint64_t lost = 0;

@@ -85,6 +85,8 @@ Json json_of(const CaptureMeasure& m) {
           {"name", m.name},
           {"delivers", m.delivers},
           {"period_ms", m.period_ms},
+          {"readout_us", or_null(m.readout_us)},
+          {"readout_is_guessed", m.readout_is_guessed},
           {"frames", m.frames},
           {"damaged", m.damaged},
           {"lost", m.lost},

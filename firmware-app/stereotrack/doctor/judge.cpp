@@ -302,6 +302,10 @@ class Judge {
       if (m.delay.count > 0 && m.delay_min_us < 0) {
         note("capture", what + ": frames bear times after their arrival",
              "tell how long reading out takes, in the configuration", readout_text(m));
+      } else if (m.readout_is_guessed) {
+        note("capture", what + ": the driver does not tell how long reading out takes",
+             "have it from the sensor's data sheet, for the configuration; this much fits what was measured",
+             readout_text(m));
       } else if (m.damaged + m.lost + m.late > 0) {
         note("capture",
              what + formatted(": %llu lost, %llu damaged, %llu without a buffer",
@@ -322,8 +326,8 @@ class Judge {
     }
   }
 
-  [[nodiscard]] std::string readout_text(const CaptureMeasure& m) const {
-    return "camera.readout_us = " + std::to_string(std::lround(suggested_readout_us(f_, m)));
+  [[nodiscard]] static std::string readout_text(const CaptureMeasure& m) {
+    return "camera.readout_us = " + std::to_string(std::lround(std::ceil(suggested_readout_us(m).value_or(0))));
   }
 
   void sync() {

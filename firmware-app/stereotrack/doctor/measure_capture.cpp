@@ -114,6 +114,8 @@ CaptureMeasures measure_capture(const capture::StereoCameras::Open& open, bool s
       told.delivers = capture::delivery_text(info);
       told.colour = has_colour(info.format);
       told.period_ms = to_ms(info.period);
+      if (info.readout) told.readout_us = to_ms(*info.readout) * 1e3;
+      told.readout_is_guessed = info.readout_is_guessed;
       const double frames = info.period.count() > 0 ? 2.0 * (time / std::chrono::duration<double>(info.period)) : 0;
       const auto room = static_cast<std::size_t>(std::min(frames + 64, static_cast<double>(kMostFrames)));
       eye.jitter_ns.reserve(room);

@@ -229,15 +229,15 @@ std::string suggest(const Findings& f, const std::optional<std::string>& calibra
   }
   text += "width = " + std::to_string(camera.width) + "\nheight = " + std::to_string(camera.height) +
           "\nformat = " + config::quoted(camera.format) + "\nfps = " + number_text(camera.fps) + "\n";
-  double readout_us = 0;
+  std::optional<double> readout_us;
   for (const CaptureMeasure& measure : f.capture) {
-    if (measure.delay.count > 0 && measure.delay_min_us < 0) {
-      readout_us = std::max(readout_us, suggested_readout_us(f, measure));
-    }
+    readout_us = std::max(readout_us, suggested_readout_us(measure));  // none is less than any
   }
-  if (readout_us > 0) {
-    text += "# Without it frames bear times after their arrival.\nreadout_us = " +
-            number_text(std::min(std::ceil(readout_us), 1e7)) + "\n";
+  if (readout_us) {
+    text +=
+        "# The driver does not tell it, or less than frames take. This much fits what was measured; the sensor's data\n"
+        "# sheet knows better.\nreadout_us = " +
+        number_text(std::min(std::ceil(*readout_us), 1e7)) + "\n";
   }
   if (has_two && f.pair) {
     // Two that nobody synchronises may stand together by chance, and elsewhere at the next start.

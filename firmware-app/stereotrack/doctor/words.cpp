@@ -80,22 +80,11 @@ std::string controls_text(const CameraFacts& camera) {
   return found.empty() ? "" : "; " + joined(found, " ");
 }
 
-double suggested_readout_us(const Findings& findings, const CaptureMeasure& measure) {
-  const config::CameraConfig& camera = findings.configuration.camera;
-  double in_force_us = camera.readout_us;
-  if (in_force_us <= 0) {
-    in_force_us = measure.period_ms * 1e3;
-    for (const CameraFound& found : findings.found.cameras) {
-      for (const CameraFacts::Format& format : found.facts.formats) {
-        for (const CameraFacts::Size& size : format.sizes) {
-          const bool is_it =
-              measure.name.find(found.facts.path) != std::string::npos && size.includes(camera.width, camera.height);
-          if (is_it && fastest(size) > 0) in_force_us = std::min(in_force_us, 1e6 / fastest(size));
-        }
-      }
-    }
-  }
-  return in_force_us + std::max(0.0, -measure.delay_min_us) + 100;
+std::optional<double> suggested_readout_us(const CaptureMeasure& measure) {
+  const bool comes_early = measure.delay.count > 0 && measure.delay_min_us < 0;
+  if (!comes_early && !measure.readout_is_guessed) return std::nullopt;
+  const double in_force_us = measure.readout_us.value_or(0);
+  return comes_early ? in_force_us - measure.delay_min_us + 100 : in_force_us;
 }
 
 }  // namespace stereotrack::doctor

@@ -22,8 +22,8 @@ namespace stereotrack::doctor {
 /// "; exposure gain trigger": controls that matter, by the driver's names; empty: none.
 [[nodiscard]] std::string controls_text(const capture::v4l2::CameraFacts& camera);
 
-/// camera.readout_us with which no frame of what was measured bears a time after its arrival [us]: what was in force,
-/// the configuration's or the driver's shortest period for the size, and what was missing.
-[[nodiscard]] double suggested_readout_us(const Findings& findings, const CaptureMeasure& measure);
+/// camera.readout_us [us] where it was guessed, or frames bore times after their arrival: what was in force, and what
+/// was missing. Empty: none is needed.
+[[nodiscard]] std::optional<double> suggested_readout_us(const CaptureMeasure& measure);
 
 }  // namespace stereotrack::doctor

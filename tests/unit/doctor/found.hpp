@@ -68,6 +68,8 @@ inline Findings good_board() {
                          .delivers = "640x480 grey8",
                          .colour = false,
                          .period_ms = 1e3 / 30,
+                         .readout_us = 9'000,
+                         .readout_is_guessed = false,
                          .frames = 150,
                          .damaged = 0,
                          .lost = 0,

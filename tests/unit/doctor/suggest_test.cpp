@@ -158,8 +158,16 @@ TEST(Suggest, WhatTheCamerasLackIsMadeUpFor) {
   f.pair = PairMeasure{.phase_ms = -9.5, .drift_ppm = 20};
   const config::Configuration c = loaded(suggest(f, "c.yml"));
   EXPECT_EQ(c.camera.tolerance, 0.5);
-  // The shortest period that the driver offers was taken for it, 1/60 s; 0.9 ms were missing, and 0.1 for good measure.
-  EXPECT_EQ(c.camera.readout_us, 17'667);
+  // 9 ms were in force, 0.9 were missing, and 0.1 for good measure.
+  EXPECT_EQ(c.camera.readout_us, 10'000);
+}
+
+// The daemon does not start without it.
+TEST(Suggest, AReadoutThatNobodyTellsIsWritten) {
+  Findings f = good_board();
+  f.capture[0].readout_is_guessed = true;
+  f.capture[0].readout_us = 16'666.4;
+  EXPECT_EQ(loaded(suggest(f, "c.yml")).camera.readout_us, 16'667);
 }
 
 // They may stand together by chance, and half a period apart at the next start.

@@ -13,9 +13,9 @@
 namespace stereotrack::capture::v4l2::test {
 namespace {
 
-using ::testing::Contains;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
-using ::testing::Not;
+using ::testing::ThrowsMessage;
 using namespace std::chrono_literals;
 
 class Frames : public VividTest {
@@ -130,14 +130,13 @@ TEST_F(Frames, StampsOfTheEndAndOfTheBeginningGiveTheSameMiddle) {
   wanted.fps = 25;
   const double end = watch(*started(wanted), 10).mean_age_ms();
   other.set("Timestamp Source", 1);
-  std::vector<std::string> notes;
   wanted.readout_us = std::nullopt;
   double start = 0;
   {
-    const auto camera = started(wanted, &notes);
+    const auto camera = started(wanted);
+    EXPECT_FALSE(camera->info().readout);
     start = watch(*camera, 10).mean_age_ms();
   }
-  EXPECT_THAT(notes, Not(Contains(HasSubstr("ends of frames"))));
   // The driver lays its start of exposure nine tenths of a period before the end of the frame.
   EXPECT_NEAR(start - end, 36, 2);
   other.set("Timestamp Source", 0);
@@ -159,19 +158,27 @@ double shortest_period_us(const Settings& wanted) {
   return shortest;
 }
 
-TEST_F(Frames, AnUnknownReadoutIsEstimatedAndTold) {
-  std::vector<std::string> notes;
+TEST_F(Frames, AReadoutThatNobodyTellsIsRequiredByItsKey) {
   Settings wanted = settings();
   wanted.readout_us = std::nullopt;
+  EXPECT_THAT([&] { (void)open(wanted); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(wanted.device), HasSubstr("set camera.readout_us"))));
+}
+
+TEST_F(Frames, WhoMeasuresMayGuessIt) {
+  Settings wanted = settings();
+  wanted.readout_us = std::nullopt;
+  wanted.guesses_readout = true;
   wanted.fps = 25;
-  double age = 0;
-  {
-    const auto camera = started(wanted, &notes);
-    age = watch(*camera, 10).mean_age_ms();
-  }
   const double shortest_us = shortest_period_us(wanted);
   ASSERT_LT(shortest_us, 20000);
-  EXPECT_THAT(notes, Contains(HasSubstr("taken for " + std::to_string(static_cast<int>(shortest_us)) + " us")));
+  double age = 0;
+  {
+    const auto camera = started(wanted);
+    EXPECT_TRUE(camera->info().readout_is_guessed);
+    EXPECT_NEAR(static_cast<double>(camera->info().readout.value_or(0ns).count()) * 1e-3, shortest_us, 1);
+    age = watch(*camera, 10).mean_age_ms();
+  }
   wanted.readout_us = 0;
   EXPECT_NEAR(age - watch(*started(wanted), 10).mean_age_ms(), shortest_us * 1e-3, 2);
 }
