@@ -89,7 +89,7 @@ class Camera {
     std::uint64_t frames = 0;   ///< taken
     std::uint64_t damaged = 0;  ///< of these
     std::uint64_t lost = 0;     ///< gaps in the sequence
-    std::uint64_t late = 0;     ///< frames whose driver had no buffer to fill, where it tells
+    std::uint64_t late = 0;     ///< of the lost: all buffers were leased, so that the driver had none to fill
     std::uint64_t steps = 0;    ///< of its clock, which no wrap-around explains: times go on from arrivals
   };
 

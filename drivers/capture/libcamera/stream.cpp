@@ -13,6 +13,7 @@ Stream::Stream(Parts parts)
     : parts_(std::move(parts)),
       module_(&parts_.session->module()),
       finder_({.boottime_ahead = parts_.boottime_ahead, .period = parts_.info.period, .readout = parts_.readout}) {
+  counters_.begin(parts_.info.buffers);
   place_pictures();
 }
 

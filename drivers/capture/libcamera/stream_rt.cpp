@@ -13,6 +13,7 @@ Camera::Take Stream::lose(const char* cause) noexcept {
 
 void Stream::give_back(std::uint32_t buffer) noexcept {
   if (loss_ != nullptr || buffer >= parts_.info.buffers) return;
+  counters_.give_back();
   module_->give_back(parts_.stream.get(), buffer);
 }
 

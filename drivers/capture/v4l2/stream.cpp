@@ -41,6 +41,7 @@ Stream::Stream(Parts parts, std::vector<std::string>& notes)
       stamp_kind_(stamp_kind(buffers_.flags(), parts_, notes)),
       in_force_(parts_.controls.settings(), parts_.control_delay_frames) {
   parts_.info.buffers = buffers_.size();
+  counters_.begin(buffers_.size());
   const Layout& layout = parts_.layout;
   for (std::uint32_t i = 0; i < buffers_.size(); ++i) {
     pictures_[i] = {buffers_.memory(i).data() + layout.offset(), layout.width, layout.height,

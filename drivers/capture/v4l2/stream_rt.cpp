@@ -48,6 +48,7 @@ int Stream::queue(std::uint32_t index) noexcept {
 void Stream::give_back(std::uint32_t buffer) noexcept {
   if (lost_ || buffer >= buffers_.size()) return;
   buffers_.end_read(buffer);
+  counters_.give_back();
   if (queue(buffer) != 0) refused_ |= 1U << buffer;
 }
 

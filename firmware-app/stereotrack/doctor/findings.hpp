@@ -112,7 +112,7 @@ struct CaptureMeasure {
   std::uint64_t frames = 0;
   std::uint64_t damaged = 0;
   std::uint64_t lost = 0;
-  std::uint64_t late = 0;  ///< whose driver had no buffer
+  std::uint64_t late = 0;  ///< of the lost, those whose driver had no buffer
   Tail jitter;             ///< distances between frames, by how much they differ from the period
   Tail delay;  ///< from the middle of the exposure to the arrival in the program; negative: the stamps are wrong
   double delay_min_us = 0;

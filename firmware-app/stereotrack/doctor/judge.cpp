@@ -306,11 +306,11 @@ class Judge {
         note("capture", what + ": the driver does not tell how long reading out takes",
              "have it from the sensor's data sheet, for the configuration; this much fits what was measured",
              readout_text(m));
-      } else if (m.damaged + m.lost + m.late > 0) {
+      } else if (m.damaged + m.lost > 0) {
         note("capture",
-             what + formatted(": %llu lost, %llu damaged, %llu without a buffer",
-                              static_cast<unsigned long long>(m.lost), static_cast<unsigned long long>(m.damaged),
-                              static_cast<unsigned long long>(m.late)),
+             what + formatted(": %llu lost (%llu without a buffer), %llu damaged",
+                              static_cast<unsigned long long>(m.lost), static_cast<unsigned long long>(m.late),
+                              static_cast<unsigned long long>(m.damaged)),
              "another USB port or cable, a smaller picture or a lower camera.fps", "sudo dmesg | tail");
       } else if (static_cast<double>(m.frames) < 0.8 * expected - 3) {
         note("capture", what + formatted(": fewer than the %.0f that %.1f a second make", expected, 1e3 / m.period_ms),

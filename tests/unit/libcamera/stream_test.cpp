@@ -192,6 +192,14 @@ TEST_F(LibcameraCamera, FramesAreLeasedAndGoBackInAnyOrder) {
   EXPECT_EQ(script_->eyes[0].returned, 1U);
   EXPECT_EQ(camera->counters().frames, 5U);
   EXPECT_EQ(camera->counters().lost, 2U);  // 5 and 6
+  EXPECT_EQ(camera->counters().late, 2U);  // nobody had a buffer for them
+  for (const std::size_t i : {0U, 1U}) camera->give_back(leased[i]);
+  for (const std::uint32_t n : {8U, 10U}) {
+    ASSERT_GE(script_->expose(0, frame(n), static_cast<std::uint8_t>(n)), 0);
+    ASSERT_EQ(camera->take(at), Take::kFrame);
+  }
+  EXPECT_EQ(camera->counters().lost, 3U);
+  EXPECT_EQ(camera->counters().late, 2U);  // there was one for 9
 }
 
 TEST_F(LibcameraCamera, ExposureAndGainInForceComeWithTheFrameAndTheMiddleOfItIsItsTime) {

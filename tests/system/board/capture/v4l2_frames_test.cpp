@@ -233,6 +233,7 @@ TEST_F(Frames, WhenAllAreLeasedThereIsNothingUntilOneComesBack) {
   EXPECT_EQ(wait_take(*camera, frame), Camera::Take::kFrame);
   EXPECT_EQ(frame.buffer, held[2].buffer);
   EXPECT_GE(camera->counters().lost, 5U);  // the sensor went on
+  EXPECT_EQ(camera->counters().late, camera->counters().lost);
 }
 
 TEST_F(Frames, OfTwoCamerasComeFromEach) {
