@@ -22,7 +22,8 @@ height = 180
 format = "rgb8"
 fps = 10.0
 tolerance = 0.5
-timeout_ms = 1000
+# With libcamera after 0.0.3 each picture of vimc's is one of 1920x1080 that the emulated CPU makes small, for seconds.
+timeout_ms = 5000
 [calibration]
 file = "/run/calibration.yml"
 [latency]
@@ -46,7 +47,7 @@ v4l2_starts_without() {
   echo broken >/run/modules/stereotrack-libcamera-9.so
   STEREOTRACK_MODULE_PATH=/run/modules /payload/stereotrackd --config /run/rig.toml --check-config \
     --set camera.driver=v4l2 --set camera.left.device=/dev/video0 --set camera.right.device= --set calibration.file= \
-    --set camera.width=320 --set camera.format=grey8
+    --set camera.width=320 --set camera.format=grey8 --set camera.readout_us=90000
 }
 plug_in() { echo vimc.1 >/sys/bus/platform/drivers/vimc/bind && udevadm settle && slow_down_vimc 1; }
 unplug() { echo vimc.1 >/sys/bus/platform/drivers/vimc/unbind; }
