@@ -1,8 +1,8 @@
 #include "firmware-app/stereotrack/progress.hpp"
+#include "firmware-app/formatted.hpp"
 
 #include <unistd.h>
 
-#include <cstdio>
 #include <ostream>
 
 namespace stereotrack {
@@ -15,15 +15,10 @@ Progress::Progress(std::ostream& out, std::optional<std::uint64_t> total)
 std::string Progress::line() const {
   const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
   const double rate = seconds > 0 ? static_cast<double>(done_) / seconds : 0;
-  char text[128];
-  if (total_ && rate > 0) {
-    const double left = *total_ > done_ ? static_cast<double>(*total_ - done_) / rate : 0;
-    (void)std::snprintf(text, sizeof text, "%llu of %llu frames, %.1f/s, %.0f s left",
-                        static_cast<unsigned long long>(done_), static_cast<unsigned long long>(*total_), rate, left);
-  } else {
-    (void)std::snprintf(text, sizeof text, "%llu frames, %.1f/s", static_cast<unsigned long long>(done_), rate);
-  }
-  return text;
+  if (!total_ || rate <= 0) return formatted("%llu frames, %.1f/s", static_cast<unsigned long long>(done_), rate);
+  const double left = *total_ > done_ ? static_cast<double>(*total_ - done_) / rate : 0;
+  return formatted("%llu of %llu frames, %.1f/s, %.0f s left", static_cast<unsigned long long>(done_),
+                   static_cast<unsigned long long>(*total_), rate, left);
 }
 
 void Progress::step() {

@@ -20,6 +20,7 @@
 #include "config/calibration/read_calibration.hpp"
 #include "config/error.hpp"
 #include "drivers/capture/synthetic/synthetic_source.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrack/interrupt.hpp"
 #include "firmware-app/stereotrack/output_file.hpp"
 #include "firmware-app/stereotrack/progress.hpp"
@@ -49,9 +50,7 @@ std::pair<int, int> parse_size(const std::string& text) {
 }
 
 std::string numbered(std::uint64_t ordinal) {
-  std::array<char, 32> name{};
-  (void)std::snprintf(name.data(), name.size(), "%06llu.png", static_cast<unsigned long long>(ordinal));
-  return name.data();
+  return formatted("%06llu.png", static_cast<unsigned long long>(ordinal));
 }
 
 /// Names with a time are told by ten digits of seconds: see time_in_name().
@@ -59,10 +58,8 @@ constexpr std::chrono::nanoseconds kFirstStamp = std::chrono::seconds(1'700'000'
 
 std::string stamped(std::chrono::nanoseconds since_first) {
   const std::chrono::nanoseconds time = kFirstStamp + since_first;
-  std::array<char, 48> name{};
-  (void)std::snprintf(name.data(), name.size(), "%lld_%09lld.png", static_cast<long long>(time.count() / 1'000'000'000),
-                      static_cast<long long>(time.count() % 1'000'000'000));
-  return name.data();
+  return formatted("%lld_%09lld.png", static_cast<long long>(time.count() / 1'000'000'000),
+                   static_cast<long long>(time.count() % 1'000'000'000));
 }
 
 /// A file that is whole or gone. Not flushed to the disk one by one: there are thousands.
@@ -112,21 +109,15 @@ cv::Mat copy_of(const Picture& picture) {
 std::string truth_rows(std::uint64_t frame, const std::vector<capture::TrueObject>& objects, bool scored) {
   std::string rows;
   for (const capture::TrueObject& o : objects) {
-    std::array<char, 256> line{};
-    (void)std::snprintf(line.data(), line.size(), "%llu,%u,%d,%d,%d,%d,%d,%.5f,%.5f,%.5f\n",
-                        static_cast<unsigned long long>(frame), o.id, o.box.left, o.box.top, o.box.width, o.box.height,
-                        scored && o.scored() ? 1 : 0, o.x, o.y, o.z);
-    rows += line.data();
+    rows += formatted("%llu,%u,%d,%d,%d,%d,%d,%.5f,%.5f,%.5f\n", static_cast<unsigned long long>(frame), o.id,
+                      o.box.left, o.box.top, o.box.width, o.box.height, scored && o.scored() ? 1 : 0, o.x, o.y, o.z);
   }
   return rows;
 }
 
 std::string pair_row(std::uint64_t frame, const capture::synthetic::Delivery& d) {
-  std::array<char, 96> line{};
-  (void)std::snprintf(line.data(), line.size(), "%llu,%d,%d,%d,%lld\n", static_cast<unsigned long long>(frame),
-                      d.left ? 1 : 0, d.right ? 1 : 0, d.right ? d.right_off : 0,
-                      static_cast<long long>(d.left && d.right ? d.skew_ns : 0));
-  return line.data();
+  return formatted("%llu,%d,%d,%d,%lld\n", static_cast<unsigned long long>(frame), d.left ? 1 : 0, d.right ? 1 : 0,
+                   d.right ? d.right_off : 0, static_cast<long long>(d.left && d.right ? d.skew_ns : 0));
 }
 
 void prepare(const fs::path& out) {

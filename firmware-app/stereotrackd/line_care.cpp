@@ -1,9 +1,8 @@
 #include "firmware-app/stereotrackd/line_care.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrackd/log.hpp"
 
 namespace stereotrack::daemon {
@@ -23,9 +22,8 @@ void LineCare::tell(gpio::LineBits failing, const std::function<std::string(std:
         {{"STEREOTRACK_CAUSE", "line"}});
   }
   if (const gpio::LineBits good = failing_ & ~failing; good != 0) {
-    std::array<char, 32> after{};
-    (void)std::snprintf(after.data(), after.size(), " after %.1f s", to_seconds(now - since_));
-    log(LogLevel::kNotice, lines_ + names(good) + " work again" + after.data(), {{"STEREOTRACK_CAUSE", "line"}});
+    log(LogLevel::kNotice, lines_ + names(good) + formatted(" work again after %.1f s", to_seconds(now - since_)),
+        {{"STEREOTRACK_CAUSE", "line"}});
   }
   failing_ = failing;
   if (failing == 0) cannot_.clear();

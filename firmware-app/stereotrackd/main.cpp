@@ -14,6 +14,7 @@
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/endpoint.hpp"
 #include "drivers/telemetry/session_file.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/rig/cameras.hpp"
 #include "firmware-app/rig/rig.hpp"
 #include "firmware-app/rig/trigger.hpp"
@@ -162,12 +163,10 @@ void log_missing(const std::vector<runtime::Missing>& missing) {
 
 std::string summary_of(const capture::SourceInfo& info, const config::Configuration& configuration,
                        std::uint64_t session) {
-  char text[256];
-  (void)std::snprintf(text, sizeof text, "%s %dx%d at %.1f pairs/s, latency %.1f ms, preset %s, session %llu",
-                      info.name.c_str(), info.width, info.height,
-                      1.0 / std::chrono::duration<double>(info.period).count(), configuration.latency.output_ms,
-                      configuration.preset.c_str(), static_cast<unsigned long long>(session));
-  return text;
+  return formatted("%s %dx%d at %.1f pairs/s, latency %.1f ms, preset %s, session %llu", info.name.c_str(), info.width,
+                   info.height, 1.0 / std::chrono::duration<double>(info.period).count(),
+                   configuration.latency.output_ms, configuration.preset.c_str(),
+                   static_cast<unsigned long long>(session));
 }
 
 // SIGUSR1.

@@ -1,6 +1,6 @@
 #include "firmware-app/stereotrackd/target_notes.hpp"
+#include "firmware-app/formatted.hpp"
 
-#include <cstdio>
 #include <limits>
 
 namespace stereotrack::daemon {
@@ -18,16 +18,11 @@ TargetNote note_of(const TrackReport& track) {
 }  // namespace
 
 std::string text_of(const TargetNote& note, double unit_m) {
-  char where[48] = "";
+  std::string text = note.is_there ? formatted("target %u is there", note.id)
+                                   : formatted("target %u is gone after %.1f s", note.id, note.age_s);
   if (note.has_depth) {
-    (void)std::snprintf(where, sizeof where, ", %sat %.2f %s", note.is_there ? "" : "last ",
-                        unit_m > 0 ? note.distance * unit_m : note.distance, unit_m > 0 ? "m" : "units");
-  }
-  char text[96];
-  if (note.is_there) {
-    (void)std::snprintf(text, sizeof text, "target %u is there%s", note.id, where);
-  } else {
-    (void)std::snprintf(text, sizeof text, "target %u is gone after %.1f s%s", note.id, note.age_s, where);
+    text += formatted(", %sat %.2f %s", note.is_there ? "" : "last ",
+                      unit_m > 0 ? note.distance * unit_m : note.distance, unit_m > 0 ? "m" : "units");
   }
   return text;
 }

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "drivers/capture/stereo_cameras/phase.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/runtime/clock.hpp"
 #include "firmware-app/stereotrack/doctor/measure.hpp"
 #include "firmware-app/stereotrack/doctor/threads.hpp"
@@ -89,9 +90,8 @@ void stream(std::vector<Eye>& eyes, capture::PhaseEstimator* phase, MonotonicTim
 }
 
 std::string no_frame(const CaptureMeasure& measure, nanoseconds time) {
-  char text[64];
-  (void)std::snprintf(text, sizeof text, "%.3g s", std::chrono::duration<double>(time).count());
-  return "camera " + measure.name + ": no frame came in " + text +
+  return "camera " + measure.name +
+         formatted(": no frame came in %.3g s", std::chrono::duration<double>(time).count()) +
          ": does it wait for a trigger (then give it one, or switch its trigger mode off), is its cable in?";
 }
 

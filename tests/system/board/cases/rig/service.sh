@@ -83,6 +83,13 @@ runs_with() {
     systemctl daemon-reload && systemctl restart "$unit" && eventually over "$paired" 2
 }
 
+# The package, a version later, with another configuration in it than the one that was installed.
+make_newer() {
+  local tree=/run/newer
+  dpkg-deb -R /payload/stereotrack_*.deb $tree && sed -i 's/^Version:.*/&+newer/' $tree/DEBIAN/control &&
+    echo '# of the newer version' >>$tree$configuration && dpkg-deb -Znone -b $tree /run/newer.deb
+}
+
 fact "the packages are installed" dpkg -i /payload/*.deb
 fact "in full" test "$(dpkg-query -W -f '${db:Status-Abbrev}' stereotrack stereotrack-tools stereotrack-libcamera)" = "ii ii ii "
 fact "nothing is enabled by that" test "$(systemctl is-enabled stereotrackd)" = disabled
@@ -160,6 +167,14 @@ fact "restarts what runs" another $unit "$one"
 fact "of several, too" another stereotrackd@two "$two"
 fact "the configuration is as it was" grep 47801 $configuration
 fact "it stays enabled" test "$(systemctl is-enabled stereotrackd)" = enabled
+one=$(main_pid $unit)
+fact "a later version has another configuration" make_newer
+fact "it is installed by who keeps his own" dpkg --force-confold -i /run/newer.deb
+fact "which stays" grep 47801 $configuration
+fact "the other one lies beside it" grep 'of the newer version' $configuration.dpkg-dist
+fact "what runs is of that version" another $unit "$one"
+fact "and back to the one before" dpkg --force-confold -i /payload/stereotrack_*.deb
+fact "with the same configuration" grep 47801 $configuration
 systemctl stop stereotrackd@two
 
 # The board has two cores.
@@ -191,5 +206,8 @@ fact "takes the configuration" test ! -e $configuration
 fact "and the state" test ! -e /var/lib/stereotrack
 fact "and the link that enabled it" test -z "$(find /etc/systemd -name 'stereotrackd.service')"
 fact "the user stays" id stereotrack
+fact "it is installed anew" dpkg -i /payload/*.deb
+fact "with the configuration as it comes" grep '^# stereotrackd: what this rig is' $configuration
+fact "nothing is enabled by that either" test "$(systemctl is-enabled stereotrackd)" = disabled
 journalctl -u stereotrackd -u stereotrackd@two -o cat | tell
 finish
