@@ -65,7 +65,7 @@ std::vector<Missing> set_up_this_thread(const ThreadPlan& plan, RealTimeMode mod
   return set_up(pthread_self(), plan, mode);
 }
 
-RealTimeProcess::RealTimeProcess(const Config& config) {
+RealTimeProcess::RealTimeProcess(const Config& config) : until_exit_(config.until_exit) {
   (void)mallopt(M_TRIM_THRESHOLD, -1);
   (void)mallopt(M_MMAP_MAX, 0);
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
@@ -84,7 +84,7 @@ RealTimeProcess::RealTimeProcess(const Config& config) {
 
 RealTimeProcess::~RealTimeProcess() {
   if (latency_fd_ >= 0) (void)close(latency_fd_);
-  (void)munlockall();
+  if (!until_exit_) (void)munlockall();
 }
 
 Thread::Thread(const ThreadPlan& plan, RealTimeMode mode, std::function<void()> body)

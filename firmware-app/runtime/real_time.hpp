@@ -42,6 +42,8 @@ class RealTimeProcess {
  public:
   struct Config {
     bool deep_sleep = false;  ///< cores may sleep as deeply as the governor likes
+    bool until_exit = false;  ///< the process ends with it: memory stays locked, since to unlock it page by page and
+                              ///< then to free it takes twice as long
   };
 
   explicit RealTimeProcess(const Config& config);
@@ -54,6 +56,7 @@ class RealTimeProcess {
  private:
   std::vector<Missing> missing_;
   int latency_fd_ = -1;
+  bool until_exit_ = false;
 };
 
 /// Gives the calling thread the priority and core of its plan; its name stays. What was not granted. Threads that it

@@ -247,7 +247,7 @@ int run(const Arguments& arguments) {
   const bool enforce = configuration.realtime.mode == config::RealTimeMode::kEnforce;
   if (configuration.realtime.mode != config::RealTimeMode::kOff) {
     process = std::make_unique<runtime::RealTimeProcess>(
-        runtime::RealTimeProcess::Config{.deep_sleep = configuration.realtime.deep_sleep});
+        runtime::RealTimeProcess::Config{.deep_sleep = configuration.realtime.deep_sleep, .until_exit = true});
     missing = process->missing();
     if (enforce && !missing.empty()) refuse(missing.front());
   }

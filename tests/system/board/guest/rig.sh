@@ -49,6 +49,18 @@ draw_scene() {
   stereotrack synth eleven --out /run/scene --frames "$1" --size "$2" && cp /run/scene/calibration.yml /etc/stereotrack/
 }
 begin() { systemctl start stereotrackd; }
+# In the background, before it is told to end: what each of its threads does ten seconds later, should it still be there.
+watch_the_end() {
+  local process task
+  process=$(property MainPID)
+  sleep 10
+  for task in /proc/"$process"/task/*; do
+    [[ -e $task ]] || break
+    echo "$(<"$task/comm"): $(sed -n 's/^State:[[:space:]]*//p' "$task/status"), ticks $(cut -d' ' -f14,15 "$task/stat")"
+    sed 's/^/  /' "$task/stack"
+  done >/run/end.txt 2>/dev/null
+}
+told_of_the_end() { tell </run/end.txt; }
 end() { systemctl stop stereotrackd && [[ $(property Result) == success ]]; }
 is_ready() { [[ $(property ActiveState) == active && -e $figures ]]; }
 runs() { eventually over stereotrack_frames_total "${1:-5}"; }

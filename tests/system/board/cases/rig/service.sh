@@ -194,10 +194,16 @@ fact "both are at some ten frames a second" eval "slow_down_vimc 0 && slow_down_
 fact "cameras of libcamera, in the same sandbox" systemctl restart stereotrackd
 fact "give pairs" eventually over "$paired" 5
 
+watch_the_end &
 fact "it ends when it is asked to" systemctl stop stereotrackd
 fact "without a failure" test -z "$(systemctl --failed --no-legend)"
+wait
+told_of_the_end
 fact "it is started once more" systemctl start stereotrackd
+watch_the_end &
 fact "a removal" dpkg -r stereotrack
+wait
+told_of_the_end
 fact "ends it" test "$(systemctl is-active stereotrackd)" = inactive
 fact "the configuration stays" test -e $configuration
 fact "so does the state" test -e /var/lib/stereotrack/session
