@@ -299,13 +299,15 @@ class Judge {
                                          us_text(m.jitter.max_us).c_str(), us_text(m.delay.p50_us).c_str(),
                                          us_text(m.delay.p999_us).c_str());
       const double expected = m.period_ms > 0 ? f_.seconds * 1e3 / m.period_ms : 0;
-      if (m.delay.count > 0 && m.delay_min_us < 0) {
-        note("capture", what + ": frames bear times after their arrival",
-             "tell how long reading out takes, in the configuration", readout_text(m));
-      } else if (m.readout_is_guessed) {
-        note("capture", what + ": the driver does not tell how long reading out takes",
+      const bool comes_early = m.delay.count > 0 && m.delay_min_us < 0;
+      if (m.readout_is_guessed && !comes_early) {
+        note("capture", m.side + ": the driver does not tell how long reading out takes",
              "have it from the sensor's data sheet, for the configuration; this much fits what was measured",
              readout_text(m));
+      }
+      if (comes_early) {
+        note("capture", what + ": frames bear times after their arrival",
+             "tell how long reading out takes, in the configuration", readout_text(m));
       } else if (m.damaged + m.lost > 0) {
         note("capture",
              what + formatted(": %llu lost (%llu without a buffer), %llu damaged",
