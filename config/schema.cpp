@@ -97,8 +97,7 @@ std::vector<Key> keys_of(Configuration& c) {
           "has it: what each pair is told to be exposed with. V4L2 alone; libcamera tells it of each frame."),
       key("camera.readout_us", c.camera.readout_us, 0, 1e7, "us",
           "From the end of an exposure to the end of its frame, where the driver stamps the latter; 0: as it tells. "
-          "Required "
-          "where it does not tell."),
+          "Required where it does not tell."),
       key("camera.timeout_ms", c.camera.timeout_ms, 10, 60000, "ms",
           "A camera that is silent for longer, once a frame has come, is given up and opened anew; four periods at "
           "least. Without the right one it goes on in mono."),

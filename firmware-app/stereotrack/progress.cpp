@@ -1,9 +1,10 @@
 #include "firmware-app/stereotrack/progress.hpp"
-#include "firmware-app/formatted.hpp"
 
 #include <unistd.h>
 
 #include <ostream>
+
+#include "firmware-app/formatted.hpp"
 
 namespace stereotrack {
 

@@ -99,7 +99,7 @@ void Service::feed_watchdog(const Daemon& daemon) {
   (void)sd_notify(0, "WATCHDOG=1");
 }
 
-void Service::log_changes(const Daemon& daemon, bool last) {
+void Service::log_changes(const Daemon& daemon) {
   const Vitals& vitals = daemon.vitals();
   if (const std::uint64_t now = vitals.efforts_left_out.get(); now != efforts_) {
     efforts_ = now;
@@ -127,7 +127,6 @@ void Service::log_changes(const Daemon& daemon, bool last) {
       log(LogLevel::kNotice, std::to_string(by) + " recording written", {{"STEREOTRACK_CAUSE", "record"}});
     }
   }
-  log_counts(daemon, last);
 }
 
 void Service::log_counts(const Daemon& daemon, bool last) {
@@ -203,7 +202,8 @@ void Service::every_second(Daemon& daemon, bool last) {
         {{"STEREOTRACK_CAUSE", "target"}, {"STEREOTRACK_COUNT", std::to_string(targets_not_told_)}});
     targets_not_told_ = 0;
   }
-  log_changes(daemon, last);
+  log_changes(daemon);
+  log_counts(daemon, last);
   const Vitals& vitals = daemon.vitals();
   (void)sd_notifyf(0, "STATUS=%s; %llu pairs, %llu targets, compute p99 %.1f ms, send error p99 %.0f us, health %llu",
                    config_.summary.c_str(), static_cast<unsigned long long>(vitals.frames.get()),

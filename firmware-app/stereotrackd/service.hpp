@@ -50,7 +50,7 @@ class Service {
   [[nodiscard]] bool take_signals();
   /// `last`: the daemon ends, so nothing waits for a later line.
   void every_second(Daemon& daemon, bool last = false);
-  void log_changes(const Daemon& daemon, bool last);
+  void log_changes(const Daemon& daemon);
   void log_counts(const Daemon& daemon, bool last);
   void tend(Daemon& daemon);
   void log_targets(Daemon& daemon);

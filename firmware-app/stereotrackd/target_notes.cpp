@@ -1,7 +1,8 @@
 #include "firmware-app/stereotrackd/target_notes.hpp"
-#include "firmware-app/formatted.hpp"
 
 #include <limits>
+
+#include "firmware-app/formatted.hpp"
 
 namespace stereotrack::daemon {
 

@@ -1,10 +1,11 @@
 #include "firmware-app/stereotrack/doctor/words.hpp"
-#include "firmware-app/formatted.hpp"
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <string_view>
+
+#include "firmware-app/formatted.hpp"
 
 namespace stereotrack::doctor {
 

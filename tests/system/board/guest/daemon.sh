@@ -53,6 +53,7 @@ slow_down_vimc() {
   local sensor
   sensor=$(media-ctl -d "platform:vimc.$1" -e "Sensor B") && v4l2-ctl -d "$sensor" -c vertical_blanking=3000
 }
+
 # [SYSTEMD-RUN OPTION...]
 start() {
   rm -f "$figures"
