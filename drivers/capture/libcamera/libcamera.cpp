@@ -41,20 +41,25 @@ nanoseconds boottime_ahead() {
   return boottime - (before + (after - before) / 2);
 }
 
-std::string cameras_text(const std::vector<LibcameraFacts>& cameras) {
+/// `complaint`: Session's.
+std::string cameras_text(const std::vector<LibcameraFacts>& cameras, const std::string& complaint) {
+  const std::string complains = complaint.empty() ? "" : ", and complains of \"" + complaint + '"';
   if (cameras.empty()) {
-    return "it knows none: is one connected, and no other program looking for cameras? That makes them busy";
+    return "it knows none" + complains +
+           ": is one connected, and no other program looking for cameras? That makes them busy";
   }
   std::string text = "it knows ";
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     text += (i == 0 ? "" : ", ") + std::to_string(i) + ": " + static_cast<const char*>(cameras[i].id) + " (" +
             static_cast<const char*>(cameras[i].model) + ')';
   }
-  return text;
+  return text + complains;
 }
 
 /// Its place.
-std::uint32_t find_camera(const std::vector<LibcameraFacts>& cameras, const std::string& device) {
+std::uint32_t find_camera(const Session& session, const std::vector<LibcameraFacts>& cameras,
+                          const std::string& device) {
+  const auto known = [&] { return cameras_text(cameras, session.complaint()); };
   const auto count = static_cast<std::uint32_t>(cameras.size());
   for (std::uint32_t i = 0; i < count; ++i) {
     if (device == static_cast<const char*>(cameras[i].id)) return i;
@@ -65,7 +70,7 @@ std::uint32_t find_camera(const std::vector<LibcameraFacts>& cameras, const std:
     if (const unsigned long place = std::strtoul(device.c_str(), nullptr, 10); place < count) {
       return static_cast<std::uint32_t>(place);
     }
-    refuse(device, "libcamera has no camera of that place; " + cameras_text(cameras));
+    refuse(device, "libcamera has no camera of that place; " + known());
   }
   std::vector<std::uint32_t> found;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -73,9 +78,9 @@ std::uint32_t find_camera(const std::vector<LibcameraFacts>& cameras, const std:
     const std::string model = static_cast<const char*>(cameras[i].model);
     if (id.find(device) != std::string::npos || model.find(device) != std::string::npos) found.push_back(i);
   }
-  if (found.empty()) refuse(device, "libcamera has none of that name; " + cameras_text(cameras));
+  if (found.empty()) refuse(device, "libcamera has none of that name; " + known());
   if (found.size() > 1) {
-    refuse(device, "libcamera has several of that name: want an id, or a place; " + cameras_text(cameras));
+    refuse(device, "libcamera has several of that name: want an id, or a place; " + known());
   }
   return found.front();
 }
@@ -167,7 +172,7 @@ std::unique_ptr<Camera> open_in(std::shared_ptr<Session> session, const Settings
   parts.session = std::move(session);
   const LibcameraModule& module = parts.session->module();
   const std::vector<LibcameraFacts> cameras = parts.session->cameras();
-  const std::uint32_t place = find_camera(cameras, settings.device);
+  const std::uint32_t place = find_camera(*parts.session, cameras, settings.device);
   const LibcameraFacts& facts = cameras[place];
   const std::string id = static_cast<const char*>(facts.id);
   const std::string name = settings.device == id ? id : settings.device + " (" + id + ")";
@@ -260,7 +265,7 @@ Listing list_cameras() {
   listing.module = session->module_text();
   listing.problems = session->problems();
   const std::vector<LibcameraFacts> cameras = session->cameras();
-  if (cameras.empty()) listing.problems.push_back("libcamera: " + cameras_text(cameras));
+  if (cameras.empty()) listing.problems.push_back("libcamera: " + cameras_text(cameras, session->complaint()));
   for (std::uint32_t i = 0; i < cameras.size(); ++i) {
     const LibcameraFacts& facts = cameras[i];
     if (facts.is_gone != 0) continue;

@@ -35,8 +35,7 @@ std::string last_error() {
 
 /// Its table, or why it does not fit.
 const LibcameraModule* try_module(const fs::path& path, std::string& problem) {
-  // libcamera reads this as it is loaded, and else tells each start at length, past our log.
-  (void)::setenv("LIBCAMERA_LOG_LEVELS", "*:ERROR", 0);
+  (void)::setenv("LIBCAMERA_LOG_LEVELS", STEREOTRACK_LIBCAMERA_LOG_LEVELS, 0);
   // Its libcamera's symbols are for it alone: another module may come with another one.
   void* const handle = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) {
@@ -159,6 +158,8 @@ Session::~Session() {
 std::string Session::module_text() const {
   return std::string("libcamera ") + module().library() + ", " + loaded_.path.string();
 }
+
+std::string Session::complaint() const { return module().complaint(manager_); }
 
 std::vector<LibcameraFacts> Session::cameras() const {
   std::vector<LibcameraFacts> all;

@@ -43,6 +43,8 @@ class Session {
   [[nodiscard]] LibcameraManager* manager() const noexcept { return manager_; }
   /// "libcamera v0.0.3, /usr/local/lib/stereotrack/stereotrack-libcamera-0.0.3.so".
   [[nodiscard]] std::string module_text() const;
+  /// The last that libcamera complained of while it looked for cameras; empty: of nothing.
+  [[nodiscard]] std::string complaint() const;
   /// Why other modules were not taken.
   [[nodiscard]] const std::vector<std::string>& problems() const noexcept { return loaded_.problems; }
 

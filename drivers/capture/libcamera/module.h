@@ -22,7 +22,7 @@ extern "C" {
 #endif
 
 enum {
-  kLibcameraModuleVersion = 1,
+  kLibcameraModuleVersion = 2,
   kLibcameraTextSize = 256,  /* with the final 0 */
   kLibcameraMostBuffers = 32 /* of a stream */
 };
@@ -121,6 +121,9 @@ typedef struct LibcameraModule {
   LibcameraManager* (*open_manager)(char* why);
   /* No stream is open any more. */
   void (*close_manager)(LibcameraManager* manager);
+  /* The last that libcamera complained of while it looked for cameras, in its words; empty: of nothing. Its log is held
+     back meanwhile, where nobody has chosen its levels or its file. Lives as long as the manager. */
+  const char* (*complaint)(LibcameraManager* manager);
 
   /* A camera that is wanted is not there. 1: devices were plugged in since the manager was opened, and it may be among
      them: all streams are lost, for another manager has to look, and there is only one at a time. 0: nothing was. */
@@ -153,6 +156,10 @@ typedef struct LibcameraModule {
   /* It may be filled again: a thread of the module queues it, for libcamera takes locks and memory to do so. */
   void (*give_back)(LibcameraStream* stream, uint32_t buffer);
 } LibcameraModule;
+
+/* LIBCAMERA_LOG_LEVELS, which libcamera reads as it is loaded, where nobody has chosen: it tells each start at length
+   otherwise. */
+#define STEREOTRACK_LIBCAMERA_LOG_LEVELS "*:ERROR"
 
 /* The one symbol of a module: its table, which lives as long as the module does. */
 #define STEREOTRACK_LIBCAMERA_ENTRY "stereotrack_libcamera_module"

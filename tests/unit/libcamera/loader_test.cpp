@@ -33,7 +33,7 @@ TEST_F(Module, EachThatDoesNotFitIsALineAndTheNextIsTried) {
   EXPECT_THAT(loaded.problems[0], HasSubstr(newest.string() + " cannot be loaded ("));
   EXPECT_THAT(loaded.problems[1], HasSubstr(lacks.string() + " cannot be loaded ("));
   EXPECT_THAT(loaded.problems[1], HasSubstr("symbol_of_another_libcamera"));
-  EXPECT_THAT(loaded.problems[2], HasSubstr(version.string() + " has interface version 2, and 1 is wanted"));
+  EXPECT_THAT(loaded.problems[2], HasSubstr(version.string() + " has interface version 3, and 2 is wanted"));
   EXPECT_THAT(loaded.problems[3], HasSubstr(size.string() + " has a table of 8 bytes"));
   EXPECT_THAT(loaded.problems[4], HasSubstr(entry.string() + " is no module of ours"));
   EXPECT_THAT(loaded.problems[5], HasSubstr(table.string() + " gives no table"));

@@ -30,6 +30,7 @@ typedef struct ScriptedEye {
 typedef struct Script {
   int32_t refuses_manager;
   int32_t cameras; /* that there are */
+  char complaint[64];
   int32_t managers_opened, managers_closed;
   int32_t plugged_in; /* something was, since: renew() loses all streams */
   ScriptedEye eyes[kScriptCameras];

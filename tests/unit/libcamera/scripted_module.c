@@ -116,6 +116,11 @@ static void close_manager(LibcameraManager* manager) {
   free(manager);
 }
 
+static const char* complaint(LibcameraManager* manager) {
+  (void)manager;
+  return script.complaint;
+}
+
 static int32_t renew(LibcameraManager* manager) {
   (void)manager;
   if (!script.plugged_in) return 0;
@@ -274,8 +279,9 @@ VISIBLE Script* the_script(void) {
 VISIBLE const LibcameraModule* stereotrack_libcamera_module(void);
 VISIBLE const LibcameraModule* stereotrack_libcamera_module(void) {
   static const LibcameraModule kTable = {SCRIPTED_VERSION, SCRIPTED_SIZE, library, open_manager, close_manager,
-                                         renew,            count,         facts,   format,       open_stream,
-                                         plane,            start,         close_stream, loss,    take, give_back};
+                                         complaint,        renew,         count,   facts,        format,
+                                         open_stream,      plane,         start,   close_stream, loss,
+                                         take,             give_back};
 #ifdef SCRIPTED_LACKS
   (void)symbol_of_another_libcamera();
 #endif

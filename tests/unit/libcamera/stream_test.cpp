@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <thread>
 
 #include "drivers/capture/libcamera/libcamera.hpp"
@@ -43,7 +44,17 @@ TEST_F(LibcameraCamera, IsFoundByItsIdItsPlaceAndWhatOnlyItsIdHas) {
   EXPECT_THAT(refusal(settings("imx477")), HasSubstr("libcamera has none of that name; it knows 0: /base/i2c@0"));
   EXPECT_THAT(refusal(settings("2")), HasSubstr("libcamera has no camera of that place"));
   script_->cameras = 0;
-  EXPECT_THAT(refusal(settings("0")), HasSubstr("it knows none"));
+  EXPECT_THAT(refusal(settings("0")), HasSubstr("it knows none: is one connected"));
+}
+
+TEST_F(LibcameraCamera, WhatLibcameraComplainsOfIsToldWhereACameraIsMissed) {
+  std::strcpy(script_->complaint, "V4L2 cannot open /dev/media0");
+  EXPECT_THAT(refusal(settings("imx477")), HasSubstr("(imx219), and complains of \"V4L2 cannot open /dev/media0\""));
+  EXPECT_TRUE(list_cameras().problems.empty());
+  script_->cameras = 0;
+  EXPECT_THAT(refusal(settings("0")), HasSubstr("knows none, and complains of \"V4L2 cannot open /dev/media0\": is"));
+  ASSERT_EQ(list_cameras().problems.size(), 1U);
+  EXPECT_THAT(list_cameras().problems[0], HasSubstr("cannot open /dev/media0"));
 }
 
 TEST_F(LibcameraCamera, AsksForWhatIsWanted) {
@@ -347,7 +358,7 @@ TEST_F(LibcameraCamera, ListTellsWhatEachCanDo) {
   const Listing none = list_cameras();
   EXPECT_FALSE(none.module.empty());
   ASSERT_EQ(none.problems.size(), 2U);
-  EXPECT_THAT(none.problems[0], HasSubstr("interface version 2"));
+  EXPECT_THAT(none.problems[0], HasSubstr("interface version 3"));
   EXPECT_THAT(none.problems[1], HasSubstr("it knows none"));
 }
 

@@ -13,6 +13,7 @@
 #include <libcamera/camera.h>
 #include <libcamera/camera_manager.h>
 #include <libcamera/framebuffer_allocator.h>
+#include <libcamera/logging.h>
 #include <libcamera/request.h>
 #include <linux/dma-buf.h>
 #include <sys/eventfd.h>
@@ -25,11 +26,14 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <exception>
+#include <iostream>
 #include <iterator>
 #include <memory>
+#include <ostream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -37,6 +41,7 @@
 #include <vector>
 
 #include "drivers/capture/libcamera/module/compat.hpp"
+#include "drivers/capture/libcamera/module/complaints.hpp"
 #include "drivers/capture/libcamera/module/handover.hpp"
 #include "drivers/capture/libcamera/module/nodes.hpp"
 
@@ -84,6 +89,38 @@ class WithoutSignals {
 
  private:
   sigset_t before_{};
+};
+
+/// While it lives libcamera's log is held back. A thread of libcamera's may be writing as it ends: the stream stays.
+class HeldLog {
+ public:
+  HeldLog() {
+    if (!is_ours()) return;
+    complaints().forget();
+    (void)lc::logSetStream(&stream());
+  }
+  HeldLog(const HeldLog&) = delete;
+  HeldLog& operator=(const HeldLog&) = delete;
+  ~HeldLog() {
+    if (is_ours()) (void)lc::logSetStream(&std::cerr, ::isatty(STDERR_FILENO) != 0);
+  }
+  [[nodiscard]] static std::string last() { return complaints().last(); }
+
+ private:
+  /// Nobody has chosen what is logged, and where to.
+  static bool is_ours() noexcept {
+    const char* const levels = std::getenv("LIBCAMERA_LOG_LEVELS");
+    return std::getenv("LIBCAMERA_LOG_FILE") == nullptr && levels != nullptr &&
+           std::strcmp(levels, STEREOTRACK_LIBCAMERA_LOG_LEVELS) == 0;
+  }
+  static lm::Complaints& complaints() {
+    static auto* const kept = new lm::Complaints;
+    return *kept;
+  }
+  static std::ostream& stream() {
+    static auto* const kept = new std::ostream(&complaints());
+    return *kept;
+  }
 };
 
 std::int64_t monotonic_now() noexcept {
@@ -233,6 +270,7 @@ struct LibcameraManager {
   }
 
   std::vector<lm::Node> nodes;  ///< that there were before it looked
+  std::string complaint;        ///< of libcamera's, while it looked
   lc::CameraManager manager;
   std::vector<Known> known;
   std::vector<LibcameraStream*> streams;             ///< that are open
@@ -434,8 +472,13 @@ LibcameraManager* open_manager(char* why) {
   return guarded<LibcameraManager*>(why, nullptr, [&]() -> LibcameraManager* {
     auto manager = std::make_unique<LibcameraManager>();
     manager->nodes = lm::list_nodes();
+    const HeldLog log;
     const int error = manager->manager.start();
-    if (error != 0) throw std::runtime_error("does not start to look for cameras (" + error_text(-error) + ")");
+    manager->complaint = HeldLog::last();
+    if (error != 0) {
+      throw std::runtime_error("does not start to look for cameras (" + error_text(-error) + ")" +
+                               (manager->complaint.empty() ? "" : " and complains of \"" + manager->complaint + '"'));
+    }
     for (const std::shared_ptr<lc::Camera>& camera : manager->manager.cameras()) {
       LibcameraManager::Known& known = manager->known.emplace_back(LibcameraManager::Known{camera, {}});
       for (const lm::Node& node : lm::list_nodes()) {
@@ -456,6 +499,8 @@ void close_manager(LibcameraManager* manager) {
     return 0;
   });
 }
+
+const char* complaint(LibcameraManager* manager) { return manager->complaint.c_str(); }
 
 std::int32_t renew(LibcameraManager* manager) {
   return guarded<std::int32_t>(nullptr, 0, [&] {
@@ -597,6 +642,7 @@ extern "C" __attribute__((visibility("default"))) const LibcameraModule* stereot
                                          library,
                                          open_manager,
                                          close_manager,
+                                         complaint,
                                          renew,
                                          count,
                                          facts,
