@@ -246,6 +246,11 @@ struct ObjectsConfig {
   std::string volume;  ///< name of the zone in space in which objects are; empty: everywhere
 };
 
+/// What of [track] is not the stage's own.
+struct TrackConfig {
+  std::array<double, 3> gravity_m_s2{};  ///< left rectified camera [m/s^2]; 0, 0, 0: nothing is expected to fall
+};
+
 /// Everything the user can say, with its defaults. Plain values: read it anywhere, once loaded it does
 /// not change. What each key does, its range and its unit stand in schema.cpp, one line a key.
 struct Configuration {
@@ -266,6 +271,7 @@ struct Configuration {
   std::vector<InputConfig> inputs;
   RecordConfig record;
   ObjectsConfig objects;
+  TrackConfig track;
   /// The stages' own Configs, see pipeline/pipeline_config.hpp; without zones and unit, which pipeline_of() adds.
   PipelineConfig pipeline;
 };

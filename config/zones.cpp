@@ -51,6 +51,8 @@ PipelineConfig pipeline_of(const Configuration& configuration, double unit_m) {
   told.zones.unit_m = unit_m;
   told.zones.zones.clear();
   told.zones.volume.reset();
+  const std::array<double, 3>& gravity = configuration.track.gravity_m_s2;
+  if (unit_m > 0) told.track.gravity = Eigen::Vector3d(gravity[0], gravity[1], gravity[2]) / unit_m;
   for (const ZoneConfig& zone : configuration.zones) {
     if (has_rule(zone)) {
       (void)told.zones.zones.push({.zone = zone_of(zone),

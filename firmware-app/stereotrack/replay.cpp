@@ -314,7 +314,7 @@ class Replay {
     states_.push_back({pair.ordinal, {result.tracks.begin(), result.tracks.end()}});
     if (states_.size() > kMostStates) states_.pop_front();
     const capture::SourceInfo& info = recording.info();
-    const Extrapolation model{rig_.configuration().pipeline.track.acceleration, info.width, info.height};
+    const Extrapolation model{info.width, info.height};
     const std::span<const record::OutputNote> outputs = recording.outputs();
     for (; next_output_ < outputs.size() && outputs[next_output_].state_ordinal <= pair.ordinal; ++next_output_) {
       const record::OutputNote& note = outputs[next_output_];

@@ -107,8 +107,7 @@ Daemon::Daemon(Parts parts)
                         " ms, decisions would overtake each other: shorten it");
   }
   publishing.encoder = {.rig = configuration.telemetry.rig_id, .session = parts.session, .signer = signer_.get()};
-  publishing.extrapolation = {
-      .acceleration = configuration.pipeline.track.acceleration, .width = info.width, .height = info.height};
+  publishing.extrapolation = {.width = info.width, .height = info.height};
   publishing.unit_m = parts.unit_m;
   if (parts.calibration != nullptr) {
     publishing.focal_x_px = parts.calibration->left.fx;

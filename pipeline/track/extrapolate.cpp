@@ -30,8 +30,9 @@ void extrapolate(const Extrapolation& model, double seconds, TrackReport& report
   x << report.position, report.velocity;
   ConstantVelocityFilter<3> filter;
   filter.resume(x, report.covariance);
-  filter.predict(seconds, model.acceleration * std::max(report.position.z(), 0.0));
+  filter.predict(seconds, report.acceleration_sd, report.acceleration);
   report.position = filter.position();
+  report.velocity = filter.velocity();
   report.covariance = filter.covariance();
   report.has_depth = !(report.position.z() <= 0);
 }

@@ -9,9 +9,9 @@ namespace stereotrack {
 
 /// Kalman filter of a point that moves with nearly constant velocity in D dimensions.
 /// State x = (p, v), measured z = p.
-///     x_k = F x_{k-1} + w,   w ~ N(0, Q)                                  (3.24), B u = 0: nobody steers
+///     x_k = F x_{k-1} + B u + w,   w ~ N(0, Q)                            (3.24), u: an acceleration that is known
 ///     z_k = H x_k + v,       v ~ N(0, R)                                  (3.25)
-///     predict   x' = F x                                                  (3.26)
+///     predict   x' = F x + B u                                            (3.26)
 ///               P' = F P F^T + Q                                          (3.27)
 ///     update    y = z - H x'                                              (3.28)
 ///               S = H P' H^T + R                                          (3.29)
@@ -20,7 +20,8 @@ namespace stereotrack {
 ///               P = (I - K H) P'                                          (3.32)
 /// The document prints (3.29) as a second (3.28); S as above is the standard one. (3.32) is computed in Joseph's
 /// form (I - K H) P' (I - K H)^T + K R K^T, equal in exact arithmetic and symmetric in ours.
-///     F = [I dt I; 0 I]     H = [I 0]     Q = s_a^2 [dt^4/4 I  dt^3/2 I; dt^3/2 I  dt^2 I]
+///     F = [I dt I; 0 I]     B = [dt^2/2 I; dt I]     H = [I 0]
+///     Q = s_a^2 [dt^4/4 I  dt^3/2 I; dt^3/2 I  dt^2 I]
 /// Q: an acceleration of standard deviation s_a, constant within one step (Bar-Shalom, Li, Kirubarajan, 6.3.2).
 /// Any length unit, seconds. One thread. O(D^3).
 template <int D>
@@ -51,8 +52,9 @@ class ConstantVelocityFilter {
     P_ = P;
   }
 
-  /// (3.26), (3.27) over dt seconds, dt >= 0, with accelerations of standard deviation acceleration_sd.
-  void predict(double dt, double acceleration_sd) noexcept {
+  /// (3.26), (3.27) over dt seconds, dt >= 0, with accelerations of standard deviation acceleration_sd about
+  /// `acceleration`, which is u.
+  void predict(double dt, double acceleration_sd, const Vector& acceleration = Vector::Zero()) noexcept {
     Covariance F = Covariance::Identity();
     F.template topRightCorner<D, D>() = Matrix::Identity() * dt;
     const double q = acceleration_sd * acceleration_sd;
@@ -62,6 +64,8 @@ class ConstantVelocityFilter {
     Q.template bottomLeftCorner<D, D>() = Q.template topRightCorner<D, D>();
     Q.template bottomRightCorner<D, D>() = Matrix::Identity() * (q * dt * dt);
     x_ = (F * x_).eval();
+    x_.template head<D>() += acceleration * (dt * dt / 2);
+    x_.template tail<D>() += acceleration * dt;
     P_ = (F * P_ * F.transpose() + Q).eval();
   }
 
@@ -88,10 +92,8 @@ class ConstantVelocityFilter {
   [[nodiscard]] Vector position() const noexcept { return x_.template head<D>(); }
   [[nodiscard]] Vector velocity() const noexcept { return x_.template tail<D>(); }
   [[nodiscard]] Matrix position_covariance() const noexcept { return P_.template topLeftCorner<D, D>(); }
+  [[nodiscard]] const State& state() const noexcept { return x_; }
   [[nodiscard]] const Covariance& covariance() const noexcept { return P_; }
-
-  /// Lets an unmeasured target slow down: velocity times `factor`, 0..1.
-  void damp(double factor) noexcept { x_.template tail<D>() *= factor; }
 
   /// What crosses frames: pipeline/core/state.hpp.
   template <class Self, class Archive>

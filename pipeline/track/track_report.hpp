@@ -30,8 +30,10 @@ struct TrackReport {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< centroid of the visible surface [calibration unit]
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [calibration unit / s]
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  ///< of (position, velocity)
-  double confidence = 0;                                                         ///< 0..1
-  double age_s = 0;                                                              ///< since its first detection [s]
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< that it is expected to have [calibration unit / s^2]
+  double acceleration_sd = 0;                              ///< and how far off that may be, each axis
+  double confidence = 0;                                   ///< 0..1
+  double age_s = 0;                                        ///< since its first detection [s]
 };
 
 }  // namespace stereotrack

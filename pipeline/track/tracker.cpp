@@ -13,6 +13,12 @@ namespace {
 using Matrix2 = ConstantVelocityFilter<2>::Matrix;
 using Vector2 = ConstantVelocityFilter<2>::Vector;
 
+// Squared Mahalanobis distance that one in a hundred measurements in space has (chi-squared, 3 degrees of freedom).
+constexpr double kDoubtful = 11.345;
+// How long a target goes on steadily, and turns, on average [s].
+constexpr double kSteadyLasts = 5.0;
+constexpr double kTurnLasts = 0.2;
+
 // Size and colour tell targets apart, but may not outweigh where they are: each adds at most this.
 constexpr double kMostSoftCost = 16.0;
 constexpr double kMostColourCost = 25.0;
@@ -89,7 +95,8 @@ Result<Tracker> Tracker::create(const Config& config, const Features::Config& fe
                                 Arena& arena) noexcept {
   if (config.confirm_hits < 1 || config.confirm_hits > 20 || config.tentative_misses < 1 || !(config.coast_s >= 0) ||
       !(config.confirm_evidence >= 0) || !(config.gate > 0) || !(config.acceleration > 0) ||
-      !(config.initial_speed > 0) || !(config.centre_noise_px > 0) || !(config.centre_noise_size >= 0)) {
+      !(config.steady_acceleration > 0) || !config.gravity.allFinite() || !(config.initial_speed > 0) ||
+      !(config.centre_noise_px > 0) || !(config.centre_noise_size >= 0)) {
     return fail(Fault::kBadConfig);
   }
   if (view.width < 1 || view.height < 1 || !(view.focal > 0) || !(view.focal_baseline >= 0)) {
@@ -100,6 +107,7 @@ Result<Tracker> Tracker::create(const Config& config, const Features::Config& fe
   Tracker self(*made);
   self.config_ = config;
   self.view_ = view;
+  self.model_count_ = config.gravity.isZero() ? 2 : 3;
   Result<Assignment> assignment = Assignment::create(kMaxTracks, kMaxDetections, arena);
   if (!assignment) return fail(assignment.error());
   self.assignment_ = *assignment;
@@ -115,6 +123,14 @@ Result<Tracker> Tracker::create(const Config& config, const Features::Config& fe
   return self;
 }
 
+std::array<InteractingModels<3>::Model, 3> Tracker::models(double distance) const noexcept {
+  return {{{.acceleration_sd = config_.steady_acceleration * distance, .lasts_s = kSteadyLasts},
+           {.acceleration_sd = config_.acceleration * distance, .lasts_s = kTurnLasts},
+           {.acceleration_sd = config_.steady_acceleration * distance,
+            .lasts_s = kSteadyLasts,
+            .acceleration = config_.gravity}}};
+}
+
 Rect Tracker::expected_box(const Target& target) noexcept {
   const Vector2 centre = target.image.position();
   return {static_cast<int>(std::floor(centre.x() - (target.width - 1) * 0.5 + 0.5)),
@@ -128,7 +144,10 @@ std::span<const Prediction> Tracker::predict(double dt, ImageView<const std::uin
   for (Target& target : targets_) {
     target.image.predict(dt, config_.acceleration * view_.focal);
     const double distance = std::max(target.space.position().z(), 0.0);
-    if (target.has_depth) target.space.predict(dt, config_.acceleration * distance);
+    if (target.has_depth) {
+      target.space.predict(dt, config_.acceleration * distance);
+      target.motion.predict(models(distance), dt);
+    }
     if (luma.empty()) {
       target.features.clear();  // a frame later they are not where their filters say
     } else {
@@ -422,6 +441,7 @@ void Tracker::take_over(std::span<const Detection> detections) noexcept {
     target.disparity_reach = heir->disparity_reach;
     target.has_depth = heir->has_depth;
     target.space = heir->space;
+    target.motion = heir->motion;
     target.features = heir->features;
     restart(target, detections[heir->label - 1U], heir->label, Taken::kInherited);
     tell_removed(*heir, Removal::kInherited, target.id);
@@ -446,6 +466,24 @@ void Tracker::follow_parent(Target& target) noexcept {
   if (apart || target.attached_frames > kTrialFrames) target.parent = 0;
 }
 
+void Tracker::start_in_space(Target& target, const Detection& detection) const noexcept {
+  const double speed = config_.initial_speed * detection.position.z();
+  target.space.start(detection.position, detection.position_covariance, speed);
+  target.motion.start(model_count_, detection.position, detection.position_covariance, speed);
+  target.has_depth = true;
+}
+
+void Tracker::measure_in_space(Target& target, const Detection& detection) const noexcept {
+  const Eigen::Vector3d& z = detection.position;
+  const Eigen::Matrix3d& R = detection.position_covariance;
+  (void)target.space.update(z, R);
+  const auto expected = target.motion.innovation(z, R);
+  // Half of something else, or a false match: what lies that far off is believed that much less. What is large changes
+  // its depth from frame to frame.
+  const double far = is_large(detection.box) ? 0 : expected.y.dot(expected.S.inverse() * expected.y);
+  (void)target.motion.update(z, R * std::max(far / kDoubtful, 1.0));
+}
+
 void Tracker::measure(Target& target, const Detection& detection, std::uint16_t label, Taken how) noexcept {
   target.label = label;
   tell_took(target, how);
@@ -454,11 +492,9 @@ void Tracker::measure(Target& target, const Detection& detection, std::uint16_t 
   if (sees_depth(target, detection)) {
     target.depth_unseen_s = 0;
     if (target.has_depth) {
-      (void)target.space.update(detection.position, detection.position_covariance);
+      measure_in_space(target, detection);
     } else {
-      target.space.start(detection.position, detection.position_covariance,
-                         config_.initial_speed * detection.position.z());
-      target.has_depth = true;
+      start_in_space(target, detection);
     }
   }
   target.measured = true;
@@ -565,11 +601,7 @@ void Tracker::start(const Detection& detection, std::uint16_t label) noexcept {
   target.measured = true;
   target.image.start(Vector2(target.first_x, target.first_y), centre_noise(config_, detection.box),
                      config_.initial_speed * view_.focal);
-  if (detection.has_depth) {
-    target.space.start(detection.position, detection.position_covariance,
-                       config_.initial_speed * detection.position.z());
-    target.has_depth = true;
-  }
+  if (detection.has_depth) start_in_space(target, detection);
   if (config_.confirm_hits == 1 && config_.travel_px <= 0 && target.evidence >= config_.confirm_evidence)
     target.state = TrackState::kConfirmed;
   if (targets_.push(target)) {
@@ -736,7 +768,7 @@ void Tracker::report() noexcept {
     out.id = target.id;
     out.state = target.state;
     out.measured = target.measured;
-    out.has_depth = target.has_depth && target.space.position().z() > 0;
+    out.has_depth = target.has_depth && target.motion.position().z() > 0;
     out.box = target.box;
     out.hull = target.hull;
     out.image_x = target.image.position().x();
@@ -744,9 +776,12 @@ void Tracker::report() noexcept {
     out.image_vx = target.image.velocity().x();
     out.image_vy = target.image.velocity().y();
     if (out.has_depth) {
-      out.position = target.space.position();
-      out.velocity = target.space.velocity();
-      out.covariance = target.space.covariance();
+      out.position = target.motion.position();
+      out.velocity = target.motion.velocity();
+      out.covariance = target.motion.covariance();
+      const auto motion = target.motion.expected_motion(models(out.position.z()));
+      out.acceleration = motion.acceleration;
+      out.acceleration_sd = motion.acceleration_sd;
     }
     out.confidence = target.quality;
     out.age_s = target.age_s;

@@ -13,6 +13,7 @@
 #include "pipeline/track/decision.hpp"
 #include "pipeline/track/detection.hpp"
 #include "pipeline/track/features.hpp"
+#include "pipeline/track/interacting_models.hpp"
 #include "pipeline/track/kalman.hpp"
 #include "pipeline/track/track_report.hpp"
 
@@ -20,9 +21,11 @@ namespace stereotrack {
 
 /// From detections to targets with an identity (3.24-3.32).
 ///
-/// A target is followed by two filters of nearly constant velocity: one of its box centre in the raw left
-/// picture, which always runs, and one of its position in space, which runs while stereo sees it. Times come
-/// from the frames' capture times.
+/// A target is followed by filters of nearly constant velocity: one of its box centre in the raw left picture, which
+/// always runs, and two of its position in space, which run while stereo sees it. The first two say where it may be
+/// found, so they expect it to turn at any time and are wide. The third says where it is and how fast: it weighs how
+/// steadily the target goes (interacting_models.hpp), and is what is reported. Times come from the frames' capture
+/// times.
 ///
 /// Place: a detection smaller than the target shows a part of it, a larger one has something added to it; the centre is
 /// then known up to half the difference of sizes, and within that it is where it was expected. At the border of the
@@ -63,12 +66,14 @@ class Tracker {
   static constexpr int kMaxDetections = 64;
 
   struct Config {
-    int confirm_hits = 3;             ///< detections that confirm a target, 1..20
-    double confirm_evidence = 1.5;    ///< and the sum of their strengths (Detection::strength, 0..1), 0..20
-    int tentative_misses = 2;         ///< frames without detection that remove a tentative target, 1..10
-    double coast_s = 1.5;             ///< how long a confirmed target lives without detections [s], 0..60
-    double gate = 4.0;                ///< association gate [standard deviations], 1..10
-    double acceleration = 1.5;        ///< process noise as a fraction of the distance [1/s^2], 0.001..100
+    int confirm_hits = 3;           ///< detections that confirm a target, 1..20
+    double confirm_evidence = 1.5;  ///< and the sum of their strengths (Detection::strength, 0..1), 0..20
+    int tentative_misses = 2;       ///< frames without detection that remove a tentative target, 1..10
+    double coast_s = 1.5;           ///< how long a confirmed target lives without detections [s], 0..60
+    double gate = 4.0;              ///< association gate [standard deviations], 1..10
+    double acceleration = 1.5;      ///< of who turns: process noise as a fraction of the distance [1/s^2], 0.001..100
+    double steady_acceleration = 0.1;                   ///< likewise of who goes on as he went, 0.001..100
+    Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [unit/s^2], left rectified camera; 0: nothing falls
     double initial_speed = 2.0;       ///< uncertainty of a new target's speed as a fraction of its distance [1/s]
     double centre_noise_px = 0.7;     ///< noise of a box centre [px], 0.05..20
     double centre_noise_size = 0.05;  ///< and what it grows by with the box's size [1], 0..1
@@ -155,6 +160,7 @@ class Tracker {
     double disparity_reach;
     ConstantVelocityFilter<2> image;
     ConstantVelocityFilter<3> space;
+    InteractingModels<3> motion;
     Rect box;
     FixedVector<Point, 48> hull;
     std::uint16_t label;  // its detection's, 0 = none in this frame
@@ -169,10 +175,15 @@ class Tracker {
               self.twin_from_y, self.whole_hits, self.misses_in_a_row, self.frames, self.age_s, self.unseen_s,
               self.depth_unseen_s, self.way_px, self.path_px, self.first_distance, self.last_x, self.last_y, self.width,
               self.height, self.area, self.quality, self.evidence, self.first_x, self.first_y, self.appearance,
-              self.disparity_reach, self.image, self.space, self.box, self.hull, self.label, self.features);
+              self.disparity_reach, self.image, self.space, self.motion, self.box, self.hull, self.label,
+              self.features);
     }
   };
 
+  /// How a target at this distance may move: steadily, turning, falling.
+  [[nodiscard]] std::array<InteractingModels<3>::Model, 3> models(double distance) const noexcept;
+  void start_in_space(Target& target, const Detection& detection) const noexcept;
+  void measure_in_space(Target& target, const Detection& detection) const noexcept;
   [[nodiscard]] static Rect expected_box(const Target& target) noexcept;
   [[nodiscard]] static double centre_along(double expected, double size, int from, int to, int end) noexcept;
   [[nodiscard]] bool sees_depth(const Target& target, const Detection& detection) const noexcept;
@@ -231,6 +242,7 @@ class Tracker {
 
   Config config_;
   View view_;
+  std::size_t model_count_ = 2;
   double dt_ = 0;
   std::uint32_t next_id_ = 1;
   std::uint64_t refused_ = 0;

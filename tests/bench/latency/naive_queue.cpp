@@ -85,7 +85,7 @@ void run_naive(const config::Configuration& configuration, const StereoCalibrati
         std::chrono::nanoseconds(static_cast<std::int64_t>(configuration.latency.output_ms * 1e6 + 0.5));
     CopiedResult result;
     while (results.pop(result)) {
-      const Extrapolation model{configuration.pipeline.track.acceleration, info.width, info.height};
+      const Extrapolation model{info.width, info.height};
       for (TrackReport& track : result.tracks) {
         extrapolate(model, to_seconds(latency), track);
       }

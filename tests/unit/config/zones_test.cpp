@@ -39,6 +39,15 @@ TEST(ZoneRulesSaid, WithoutAnyThePipelineIsToldNothing) {
   EXPECT_FALSE(told(kHall + kPole).zones.any()) << "zones of signals alone";
 }
 
+TEST(GravitySaid, ArrivesInUnitsOfTheCalibrationWhichMustBeKnown) {
+  const std::string level = "[track]\ngravity_m_s2 = [0, 9.81, 0]\n";
+  EXPECT_NEAR(told(level, 0.0254).track.gravity.y(), 386.2, 0.1) << "inches";
+  EXPECT_TRUE(told("").track.gravity.isZero());
+  EXPECT_NE(refused(level, 0).find("track.gravity_m_s2: it is in metres, and the calibration's unit is not known"),
+            std::string::npos);
+  EXPECT_EQ(refused("[track]\ngravity_m_s2 = [0, 0, 0]\n", 0), "");
+}
+
 TEST(ZoneRulesSaid, AllThatCanBeSaidArrives) {
   const ZoneRules::Config zones =
       told("[objects]\nmin_size_m = 0.2\nmax_size_m = 4\nvolume = \"hall\"\n" + kHall + kPole +

@@ -9,7 +9,7 @@
 namespace stereotrack {
 namespace {
 
-constexpr Extrapolation kModel{.acceleration = 1.5, .width = 640, .height = 480};
+constexpr Extrapolation kModel{.width = 640, .height = 480};
 
 TrackReport walker() {
   TrackReport report;
@@ -23,11 +23,12 @@ TrackReport walker() {
   report.position = {0.5, 0.25, 4};
   report.velocity = {1, 0, -2};
   report.covariance.diagonal() << 0.01, 0.01, 0.04, 0.09, 0.09, 0.16;
+  report.acceleration_sd = 6;
   report.age_s = 1;
   return report;
 }
 
-// Worked by hand: s = 0.1; q = (1.5 x 4)^2 = 36; P_zz' = 0.04 + 0.01 x 0.16 + 36 x 1e-4 / 4 = 0.0425;
+// Worked by hand: s = 0.1; q = 6^2 = 36; P_zz' = 0.04 + 0.01 x 0.16 + 36 x 1e-4 / 4 = 0.0425;
 // P_z,vz' = 0.1 x 0.16 + 36 x 1e-3 / 2 = 0.034; P_vz,vz' = 0.16 + 36 x 0.01 = 0.52.
 TEST(Extrapolate, AgreesWithAnExampleByHand) {
   TrackReport report = walker();

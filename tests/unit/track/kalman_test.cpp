@@ -225,12 +225,15 @@ TEST(Kalman, SingularInnovationIsAFaultAndLeavesTheState) {
   EXPECT_EQ(filter.covariance(), before.covariance());
 }
 
-TEST(Kalman, DampingSlowsDown) {
-  Filter3 filter;
-  filter.start({1, 2, 3}, Eigen::Matrix3d::Identity(), 2, {4, 5, 6});
-  filter.damp(0.5);
-  EXPECT_EQ(filter.velocity(), Eigen::Vector3d(2, 2.5, 3));
-  EXPECT_EQ(filter.position(), Eigen::Vector3d(1, 2, 3));
+TEST(Kalman, AKnownAccelerationMovesTheStateAndNotItsCovariance) {
+  Filter3 falls;
+  falls.start({1, 2, 3}, Eigen::Matrix3d::Identity(), 2, {4, 5, 6});
+  Filter3 floats = falls;
+  falls.predict(0.5, 1, {0, 9.81, 0});
+  floats.predict(0.5, 1);
+  EXPECT_NEAR((falls.position() - floats.position() - Eigen::Vector3d(0, 9.81 / 8, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((falls.velocity() - floats.velocity() - Eigen::Vector3d(0, 9.81 / 2, 0)).norm(), 0, 1e-12);
+  EXPECT_EQ(falls.covariance(), floats.covariance());
 }
 
 }  // namespace

@@ -257,6 +257,58 @@ TEST_F(TrackerOf, ReportTellsWhereAndHowFast) {
   EXPECT_EQ(report.covariance.llt().info(), Eigen::Success);
 }
 
+TEST_F(TrackerOf, VelocityOfWhoGoesStraightIsHardlyMovedByErrors) {
+  // 1.5 m/s across at 5 m; the box is a pixel off, by turns for three frames to either side.
+  const auto worst_error = [this](double steady_acceleration) {
+    Tracker::Config c = config();
+    c.steady_acceleration = steady_acceleration;
+    make(c);
+    double worst = 0;
+    for (int k = 0; k <= 75; ++k) {
+      const double off = k / 3 % 2 == 0 ? 1 : -1;
+      step({seen_at(100 + 1.5 * k * kDt * kFocal / 5 + off, 240, kFocalBaseline / 5)});
+      if (k >= 25) worst = std::max(worst, std::abs(reports()[0].velocity.x() - 1.5));
+    }
+    return worst;
+  };
+  const double error = worst_error(config().steady_acceleration);
+  EXPECT_LT(error, 0.15);
+  EXPECT_GT(worst_error(config().acceleration), 1.5 * error) << "as if each target turned at any time";
+}
+
+TEST_F(TrackerOf, OneFalseMatchHardlyMovesWhatIsReported) {
+  for (int k = 0; k < 40; ++k) {
+    step({seen_at(320, 240, k == 30 ? 22 : 20)});  // 4.55 m in place of 5 m: ten standard deviations
+    if (k < 30) continue;
+    EXPECT_NEAR(reports()[0].position.z(), 5, 0.1) << k;
+  }
+}
+
+// Thrown up at 5 m/s, seen for half a second, then hidden for 0.4 s.
+TEST_F(TrackerOf, WhatWasThrownIsPredictedToFallWhereGravityIsKnown) {
+  const auto error_when_hidden = [this](const Eigen::Vector3d& gravity) {
+    Tracker::Config c = config();
+    c.gravity = gravity;
+    make(c);
+    Eigen::Vector3d p(-1, 0.8, 5);
+    Eigen::Vector3d v(1.5, -5, 0);
+    for (int k = 0; k < 22; ++k) {
+      if (k < 12) {
+        step({seen_at(kWidth / 2.0 + p.x() * kFocal / 5, kHeight / 2.0 + p.y() * kFocal / 5, kFocalBaseline / 5)});
+      } else {
+        step({});
+      }
+      if (k == 21) break;
+      const Eigen::Vector3d a(0, 9.81, 0);
+      p += v * kDt + a * (kDt * kDt / 2);
+      v += a * kDt;
+    }
+    return reports().empty() ? 1e9 : (reports()[0].position - p).norm();
+  };
+  EXPECT_LT(error_when_hidden({0, 9.81, 0}), 0.25);
+  EXPECT_GT(error_when_hidden({0, 0, 0}), 0.5);
+}
+
 TEST_F(TrackerOf, FlickerInPlaceIsNeverConfirmed) {
   std::mt19937 random(1);
   Tracker::Config c = config();
@@ -1009,6 +1061,8 @@ TEST(Tracker, Faults) {
   EXPECT_EQ(fault_of([](auto& c) { c.coast_s = -1; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([&](auto& c) { c.gate = nan; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.acceleration = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([](auto& c) { c.steady_acceleration = 0; }), Fault::kBadConfig);
+  EXPECT_EQ(fault_of([&](auto& c) { c.gravity.y() = nan; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.initial_speed = 0; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.centre_noise_px = 0; }), Fault::kBadConfig);
   EXPECT_EQ(fault_of([](auto& c) { c.centre_noise_size = -1; }), Fault::kBadConfig);
