@@ -364,14 +364,12 @@ std::vector<Key> keys_of(Configuration& c) {
       key("track.gate", p.track.gate, 1, 10, "sd", "How far from its prediction a target may be found."),
       key("track.acceleration", p.track.acceleration, 0.001, 100, "distance/s^2",
           "Accelerations expected of a target that turns, starts or stops, as a fraction of its distance: higher "
-          "follows "
-          "it at once."),
+          "follows it at once."),
       key("track.steady_acceleration", p.track.steady_acceleration, 0.001, 100, "distance/s^2",
           "Likewise of one that goes on as it went: lower smooths. What it does is told by how well either fits."),
       key("track.gravity_m_s2", c.track.gravity_m_s2, -1000, 1000, "m/s^2",
           "Gravity as the left rectified camera sees it, to the right, down, forward; [0, 9.81, 0] for a level one. "
-          "Given, "
-          "a target may be one that falls or was thrown, too."),
+          "Given, a target may be one that falls or was thrown, too."),
       key("track.initial_speed", p.track.initial_speed, 0.001, 100, "distance/s",
           "Speeds expected of a new target, as a fraction of its distance."),
       key("track.centre_noise_px", p.track.centre_noise_px, 0.05, 20, "px", "Noise of a box centre."),

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 
@@ -43,7 +44,7 @@ class InteractingModels {
              const Vector& velocity = Vector::Zero()) noexcept {
     filters_[0].start(z, R, velocity_sd, velocity);
     filters_.fill(filters_[0]);
-    count_ = std::clamp<std::size_t>(models, 1, kMost);
+    count_ = static_cast<std::uint32_t>(std::clamp<std::size_t>(models, 1, kMost));
     probabilities_.fill(0);
     for (std::size_t j = 0; j < count_; ++j) probabilities_[j] = 1.0 / static_cast<double>(count_);
     combine();
@@ -83,6 +84,7 @@ class InteractingModels {
       const Result<Innovation> one = updated[j].update(z, R);
       if (!one) return fail(one.error());
       fit[j] = -0.5 * (one->y.dot(one->S.inverse() * one->y) + std::log(one->S.determinant()));
+      if (!std::isfinite(fit[j])) return fail(Fault::kSingular);
       best = std::max(best, fit[j]);
     }
     filters_ = updated;
@@ -129,7 +131,7 @@ class InteractingModels {
 
   void combine() noexcept { combined_ = Filter::mixed(filters_, probabilities_, count_); }
 
-  std::size_t count_ = 1;
+  std::uint32_t count_ = 1;
   std::array<Filter, kMost> filters_;
   std::array<double, kMost> probabilities_{1, 0, 0};
   Filter combined_;
