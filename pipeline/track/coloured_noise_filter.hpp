@@ -2,8 +2,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/LU>
-#include <cmath>
+#include <cstddef>
 
+#include "pipeline/core/pinned_math.hpp"
 #include "pipeline/core/result.hpp"
 
 namespace stereotrack {
@@ -67,7 +68,7 @@ class ColouredNoiseFilter {
   /// (3.26), (3.27) over dt seconds, dt >= 0, with accelerations of standard deviation acceleration_sd about
   /// `acceleration`.
   void predict(double dt, double acceleration_sd, const Vector& acceleration) noexcept {
-    const double f = std::exp(-dt / kSlow_s);
+    const double f = pinned_exp(-dt / kSlow_s);
     const double q = acceleration_sd * acceleration_sd;
     x_.template segment<D>(kPlace) += dt * velocity() + dt * dt / 2 * acceleration;
     x_.template segment<D>(kVelocity) += dt * acceleration;
@@ -102,9 +103,10 @@ class ColouredNoiseFilter {
     const Gain U = P_.template leftCols<D>() + P_.template rightCols<D>();
     const Gain K = U * S_inverse;
     x_ += K * innovation.y;
-    const Covariance AP = P_ - K * U.transpose();
+    const Covariance AP = P_ - K.lazyProduct(U.transpose());  // the other product may ask for heap
     const Gain APH = AP.template leftCols<D>() + AP.template rightCols<D>();
-    const Covariance joseph = AP + (((1 - kSlowPart) * K * R - APH) * K.transpose());
+    const Gain rest = (1 - kSlowPart) * K * R - APH;
+    const Covariance joseph = AP + rest.lazyProduct(K.transpose());
     P_ = 0.5 * (joseph + joseph.transpose());
     slow_ = kSlowPart * R;
     return innovation;

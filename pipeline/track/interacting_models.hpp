@@ -8,6 +8,7 @@
 #include <limits>
 #include <span>
 
+#include "pipeline/core/pinned_math.hpp"
 #include "pipeline/core/result.hpp"
 #include "pipeline/track/coloured_noise_filter.hpp"
 
@@ -57,7 +58,7 @@ class InteractingModels {
     for (std::size_t j = 0; j < count_; ++j) {
       std::array<double, kMost> share{};  // p_ij mu_i, then mu_i|j
       for (std::size_t i = 0; i < count_; ++i) {
-        const double stays = count_ == 1 ? 1 : std::exp(-dt / models[i].lasts_s);
+        const double stays = count_ == 1 ? 1 : pinned_exp(-dt / models[i].lasts_s);
         share[i] = probabilities_[i] * (i == j ? stays : (1 - stays) / static_cast<double>(count_ - 1));
         prior[j] += share[i];
       }
@@ -78,20 +79,23 @@ class InteractingModels {
   [[nodiscard]] Result<Innovation> update(const Vector& z, const Matrix& R) noexcept {
     const Innovation innovation = this->innovation(z, R);
     std::array<Filter, kMost> updated = filters_;
-    std::array<double, kMost> fit{};  // log N(y; 0, S), but for what is the same for all
-    double best = -std::numeric_limits<double>::infinity();
+    std::array<double, kMost> distance{};  // squared Mahalanobis
+    std::array<double, kMost> volume{};    // determinant of S
+    double least = std::numeric_limits<double>::infinity();
     for (std::size_t j = 0; j < count_; ++j) {
       const Result<Innovation> one = updated[j].update(z, R);
       if (!one) return fail(one.error());
-      fit[j] = -0.5 * (one->y.dot(one->S.inverse() * one->y) + std::log(one->S.determinant()));
-      if (!std::isfinite(fit[j])) return fail(Fault::kSingular);
-      best = std::max(best, fit[j]);
+      distance[j] = one->y.dot(one->S.inverse() * one->y);
+      volume[j] = one->S.determinant();
+      if (!std::isfinite(distance[j]) || !(volume[j] > 0)) return fail(Fault::kSingular);
+      least = std::min(least, distance[j]);
     }
     filters_ = updated;
     double sum = 0;
     for (std::size_t j = 0; j < count_; ++j) {
       // A model that fits badly now may fit in the next frame.
-      probabilities_[j] = std::max(probabilities_[j] * std::exp(fit[j] - best), kLeast);
+      const double fit = pinned_exp((least - distance[j]) / 2) * std::sqrt(volume[0] / volume[j]);
+      probabilities_[j] = std::max(probabilities_[j] * fit, kLeast);
       sum += probabilities_[j];
     }
     for (double& probability : probabilities_) probability /= sum;
