@@ -92,7 +92,6 @@ class ConstantVelocityFilter {
   [[nodiscard]] Vector position() const noexcept { return x_.template head<D>(); }
   [[nodiscard]] Vector velocity() const noexcept { return x_.template tail<D>(); }
   [[nodiscard]] Matrix position_covariance() const noexcept { return P_.template topLeftCorner<D, D>(); }
-  [[nodiscard]] const State& state() const noexcept { return x_; }
   [[nodiscard]] const Covariance& covariance() const noexcept { return P_; }
 
   /// What crosses frames: pipeline/core/state.hpp.

@@ -107,7 +107,6 @@ Result<Tracker> Tracker::create(const Config& config, const Features::Config& fe
   Tracker self(*made);
   self.config_ = config;
   self.view_ = view;
-  self.model_count_ = config.gravity.isZero() ? 2 : 3;
   Result<Assignment> assignment = Assignment::create(kMaxTracks, kMaxDetections, arena);
   if (!assignment) return fail(assignment.error());
   self.assignment_ = *assignment;
@@ -469,7 +468,8 @@ void Tracker::follow_parent(Target& target) noexcept {
 void Tracker::start_in_space(Target& target, const Detection& detection) const noexcept {
   const double speed = config_.initial_speed * detection.position.z();
   target.space.start(detection.position, detection.position_covariance, speed);
-  target.motion.start(model_count_, detection.position, detection.position_covariance, speed);
+  const std::size_t models = config_.gravity.isZero() ? 2 : 3;
+  target.motion.start(models, detection.position, detection.position_covariance, speed);
   target.has_depth = true;
 }
 

@@ -242,7 +242,6 @@ class Tracker {
 
   Config config_;
   View view_;
-  std::size_t model_count_ = 2;
   double dt_ = 0;
   std::uint32_t next_id_ = 1;
   std::uint64_t refused_ = 0;

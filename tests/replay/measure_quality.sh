@@ -50,7 +50,7 @@ measure_conveyor() {
 | best track's share of frames 106-252, % | $(percent coverage <<<"$box") | 95 |
 | tracks in frames 106-252 (box, hands, others) | $(value ids <<<"$box") | one on the box |
 | the box's track in frames 180-250, % | $(percent coverage <<<"$line") | 95 |
-| residual from a straight line at constant speed, 180-250, squares | $(value rms_3d <<<"$line") | 0.07 |
+| residual from a straight line at constant speed, 180-250, squares | $(value rms_3d <<<"$line") | 0.06 |
 | speed, squares a frame | $(value speed_a_frame <<<"$line") | 0.173 |
 | tracks on the empty belt, frames 1-80 | $(ids_in "$tracks" 1 80) | 0 |
 

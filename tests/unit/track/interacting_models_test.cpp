@@ -49,7 +49,7 @@ TEST(InteractingModels, OneModelIsItsFilter) {
   EXPECT_EQ(models.probability(0), 1);
 }
 
-/// RMS error of the velocity in the last of `seconds` before a turn, and how many frames it takes from the turn on
+/// RMS error of the velocity in the last second before a turn, and how many frames it takes from the turn on
 /// until the velocity is within half of what changed; a mean of 20 walkers.
 struct Response {
   double steady_error = 0;
