@@ -29,7 +29,7 @@ void open_recording(const std::string& path, Rig& rig) {
   rig.source = std::move(recording);
 }
 
-void open_scene(const std::string& name, Rig& rig) {
+void open_scene(const std::string& name, bool truth, Rig& rig) {
   const config::Configuration& configuration = rig.configuration();
   capture::SyntheticOptions options;
   options.fps = configuration.source.fps;
@@ -37,6 +37,7 @@ void open_scene(const std::string& name, Rig& rig) {
   options.frames = static_cast<std::uint64_t>(configuration.synthetic.frames);
   options.width = configuration.synthetic.width;
   options.height = configuration.synthetic.height;
+  options.truth = truth;
   std::unique_ptr<capture::SyntheticSource> scene;
   try {
     scene = capture::open_synthetic(name.substr(kSynthetic.size()), options);
@@ -46,6 +47,7 @@ void open_scene(const std::string& name, Rig& rig) {
   rig.calibration = scene->calibration();
   rig.calibration_name = name;
   rig.unit_m = 1;
+  rig.scene = scene.get();
   rig.source = std::move(scene);
 }
 

@@ -16,6 +16,10 @@
 
 namespace stereotrack {
 
+namespace capture {
+class SyntheticSource;
+}
+
 /// What starts the name of a scene that is drawn: synthetic:NAME.
 inline constexpr std::string_view kSynthetic = "synthetic:";
 
@@ -27,6 +31,7 @@ struct Rig {
   config::Loaded loaded;
   std::unique_ptr<capture::FrameSource> source;
   const record::RecordingSource* recording = nullptr;  ///< the source, where it is a recording of ours
+  const capture::SyntheticSource* scene = nullptr;     ///< the source, where it is a scene that is drawn
   std::optional<StereoCalibration> calibration;        ///< none for mono
   std::string calibration_name;                        ///< for messages
   double unit_m = 0;                                   ///< metres in one unit of the calibration, 0 = not known
@@ -42,8 +47,9 @@ struct Rig {
 /// Opens a recording of ours, which brings its calibration and unit, and its configuration for who wants it.
 void open_recording(const std::string& path, Rig& rig);
 
-/// Draws synthetic:NAME, which brings its calibration, as [synthetic] and source.fps say.
-void open_scene(const std::string& name, Rig& rig);
+/// Draws synthetic:NAME, which brings its calibration, as [synthetic] and source.fps say; `truth`: and works out its
+/// ground truth for every pair.
+void open_scene(const std::string& name, bool truth, Rig& rig);
 
 /// The calibration of a stereo source.
 void read_calibration(const std::string& path, const calibration::ReadOptions& options, Rig& rig);

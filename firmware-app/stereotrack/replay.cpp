@@ -30,6 +30,7 @@
 #include "firmware-app/stereotrack/progress.hpp"
 #include "firmware-app/stereotrack/summary.hpp"
 #include "firmware-app/stereotrack/tracks_file.hpp"
+#include "firmware-app/stereotrack/truth_file.hpp"
 #include "pipeline/track/extrapolate.hpp"
 
 namespace stereotrack {
@@ -166,6 +167,7 @@ class Replay {
       } else {
         process(pair);
       }
+      if (arguments_.truth) truth_.add(pair.ordinal, *rig_.scene);
       progress.step();
     }
     progress.finish();
@@ -187,6 +189,7 @@ class Replay {
       summary_.telemetry_dropped = udp_->counters().dropped;
       summary_.telemetry_failed = udp_->counters().failed;
     }
+    if (arguments_.truth) truth_.save(*arguments_.truth);
     if (!arguments_.out) return;
     const fs::path folder = *arguments_.out;
     try {
@@ -372,6 +375,7 @@ class Replay {
   Digest pixels_;
   Digest payloads_;
   TracksFile tracks_;
+  TruthFile truth_;
   Summary summary_;
   bool skipped_before_ = false;
   bool explained_ = false;

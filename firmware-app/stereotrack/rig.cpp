@@ -62,6 +62,9 @@ FrameRange parse_frames(const std::string& text, const std::string& option) {
 Rig open_rig(const RigArguments& arguments) {
   Rig rig;
   const bool synthetic = arguments.source.starts_with(kSynthetic);
+  if (arguments.truth && !synthetic) {
+    throw config::Error("--truth: of " + arguments.source + " none is known; synthetic:NAME has one");
+  }
   const fs::path folder = synthetic ? fs::path() : folder_of(arguments.source);
   std::optional<std::string> file = arguments.config;
   if (!file && !synthetic && fs::exists(folder / "stereotrack.toml")) file = (folder / "stereotrack.toml").string();
@@ -77,7 +80,7 @@ Rig open_rig(const RigArguments& arguments) {
   const config::Configuration& configuration = rig.configuration();
 
   if (synthetic) {
-    open_scene(arguments.source, rig);
+    open_scene(arguments.source, arguments.truth, rig);
   } else if (rig.recording == nullptr) {
     rig.source = capture::open_replay(arguments.source, {.fps = configuration.source.fps,
                                                          .flip = configuration.source.flip,

@@ -24,6 +24,7 @@
 #include "firmware-app/stereotrack/interrupt.hpp"
 #include "firmware-app/stereotrack/output_file.hpp"
 #include "firmware-app/stereotrack/progress.hpp"
+#include "firmware-app/stereotrack/truth_file.hpp"
 
 namespace stereotrack {
 namespace {
@@ -106,15 +107,6 @@ cv::Mat copy_of(const Picture& picture) {
   return picture.empty() ? cv::Mat() : copy_of(picture.data, picture.width, picture.height, CV_8UC3);
 }
 
-std::string truth_rows(std::uint64_t frame, const std::vector<capture::TrueObject>& objects, bool scored) {
-  std::string rows;
-  for (const capture::TrueObject& o : objects) {
-    rows += formatted("%llu,%u,%d,%d,%d,%d,%d,%.5f,%.5f,%.5f\n", static_cast<unsigned long long>(frame), o.id,
-                      o.box.left, o.box.top, o.box.width, o.box.height, scored && o.scored() ? 1 : 0, o.x, o.y, o.z);
-  }
-  return rows;
-}
-
 std::string pair_row(std::uint64_t frame, const capture::synthetic::Delivery& d) {
   return formatted("%llu,%d,%d,%d,%lld\n", static_cast<unsigned long long>(frame), d.left ? 1 : 0, d.right ? 1 : 0,
                    d.right ? d.right_off : 0, static_cast<long long>(d.left && d.right ? d.skew_ns : 0));
@@ -170,7 +162,7 @@ int run_synth(const SynthArguments& arguments, std::ostream& messages) {
   const Interrupts interrupts;
 
   Progress progress(messages, source->info().pairs);
-  std::string rows;
+  TruthFile truth_file;
   std::string pairs = "frame,left,right,right_off,skew_ns\n";
   std::array<std::set<std::string>, 2> written;
   std::uint64_t last = 0;
@@ -197,7 +189,7 @@ int run_synth(const SynthArguments& arguments, std::ostream& messages) {
     for (std::size_t side = 0; side < written.size(); ++side) {
       if (!pictures.pictures[side].empty()) written[side].insert(pictures.names[side]);
     }
-    rows += truth_rows(pair.ordinal, truth.objects, whole && delivery.right_off == 0);
+    truth_file.add(pair.ordinal, *source);
     last = pair.ordinal;
     if (writing.valid()) writing.get();
     writing =
@@ -217,10 +209,8 @@ int run_synth(const SynthArguments& arguments, std::ostream& messages) {
     pairs_file.write(pairs);
     pairs_file.commit();
   }
-  OutputFile truth_file(arguments.out / "gt.csv");
-  truth_file.write(rows);
   calibration::write_opencv((arguments.out / "calibration.yml").string(), source->calibration());
-  truth_file.commit();
+  truth_file.save(arguments.out / "gt.csv");
   return 0;
 }
 

@@ -128,6 +128,12 @@ TEST_F(BadInput, CalibrationOfMonoSourceIsRefused) {
   expect_refused({"replay", "mono:" + (scene_ / "left").string(), "--calibration", file}, kBadUsage, {file, "mono"});
 }
 
+TEST_F(BadInput, TruthOfARecordingIsRefused) {
+  const fs::path file = folder_ / "gt.csv";
+  expect_refused(replay({"--truth", file.string()}), kBadUsage, {"--truth", scene_.string(), "synthetic:NAME"});
+  EXPECT_FALSE(fs::exists(file));
+}
+
 TEST_F(BadInput, OutputFolderThatCannotBeIsNamed) {
   const fs::path file = folder_.write("file", "kept");
   for (const std::string& out : {file.string(), (file / "below").string(), std::string("/proc/stereotrack"),

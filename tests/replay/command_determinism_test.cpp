@@ -182,6 +182,23 @@ TEST_P(SyntheticDeterminism, SameSceneTwiceGivesTheSameBytes) {
   expect_same_results(folder / "first", folder / "second");
 }
 
+// The scene has missing pictures and pairs one frame off, which are not scored.
+TEST(SyntheticTruth, OfAReplayIsThatOfTheFilesAndChangesNothing) {
+  const TempDir folder;
+  const ProgramResult result = stereotrack_command(
+      {"synth", "dropout", "--out", (folder / "files").string(), "--frames", "240", "--size", "160x120"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::vector<std::string> small{"--set", "synthetic.frames=240", "--set", "synthetic.width=160",
+                                       "--set", "synthetic.height=120"};
+  std::vector<std::string> with_truth = small;
+  with_truth.insert(with_truth.end(), {"--truth", (folder / "gt.csv").string()});
+  replay("synthetic:dropout", folder / "with", with_truth);
+  replay("synthetic:dropout", folder / "without", small);
+  EXPECT_GT(fs::file_size(folder / "gt.csv"), 0U);
+  EXPECT_EQ(read_text(folder / "gt.csv"), read_text(folder / "files" / "gt.csv"));
+  expect_same_results(folder / "with", folder / "without");
+}
+
 INSTANTIATE_TEST_SUITE_P(Presets, SyntheticDeterminism, testing::Values("robust", "thesis"),
                          [](const auto& instance) { return std::string(instance.param); });
 

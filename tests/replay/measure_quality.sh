@@ -129,8 +129,7 @@ measure_eleven() {
 END
   for seed in ${SEEDS:-1 2 3 4 5}; do
     folder=$work/eleven$seed
-    quiet "$stereotrack" synth eleven --seed "$seed" --out "$folder"
-    replay "$folder/out" "$folder"
+    replay "$folder/out" synthetic:eleven --set "synthetic.seed=$seed" --truth "$folder/gt.csv"
     "$stereotrack" eval --truth "$folder/gt.csv" --tracks "$folder/out/tracks.csv" --json >"$folder/eval.json"
     awk -F'[:,]' -v seed="$seed" '
       {gsub(/[" ]/, "", $1); got[$1] = $2}

@@ -27,25 +27,42 @@ double cell(std::int64_t x, std::int64_t y, std::int64_t z, std::uint32_t seed) 
 
 double fade(double t) noexcept { return t * t * (3.0 - 2.0 * t); }
 
+/// The whole part below and the rest, for |v| < 2^63; a call of std::floor takes longer than all else here on x86-64.
+struct Split {
+  explicit Split(double v) noexcept : below(static_cast<std::int64_t>(v)) {
+    if (static_cast<double>(below) > v) --below;
+    rest = v - static_cast<double>(below);
+  }
+  std::int64_t below;
+  double rest;
+};
+
+/// Between the four corners of a cell.
+double between(const Split& u, const Split& v, double right, double up, std::uint32_t seed) noexcept {
+  return mix(mix(cell(u.below, v.below, 0, seed), cell(u.below + 1, v.below, 0, seed), right),
+             mix(cell(u.below, v.below + 1, 0, seed), cell(u.below + 1, v.below + 1, 0, seed), right), up);
+}
+
 double noise(double u, double v, std::uint32_t seed) noexcept {
-  const double fu = std::floor(u);
-  const double fv = std::floor(v);
-  const auto i = static_cast<std::int64_t>(fu);
-  const auto j = static_cast<std::int64_t>(fv);
-  const double s = fade(u - fu);
-  return mix(mix(cell(i, j, 0, seed), cell(i + 1, j, 0, seed), s),
-             mix(cell(i, j + 1, 0, seed), cell(i + 1, j + 1, 0, seed), s), fade(v - fv));
+  const Split across(u);
+  const Split upright(v);
+  return between(across, upright, fade(across.rest), fade(upright.rest), seed);
 }
 
 double noise(Vec3 p, std::uint32_t seed) noexcept {
-  const double fz = std::floor(p.z);
-  const auto k = static_cast<std::int64_t>(fz);
-  const auto slice = [&](std::int64_t z) { return noise(p.x, p.y, scramble(seed ^ static_cast<std::uint32_t>(z))); };
-  return mix(slice(k), slice(k + 1), fade(p.z - fz));
+  const Split x(p.x);
+  const Split y(p.y);
+  const Split z(p.z);
+  const double right = fade(x.rest);
+  const double up = fade(y.rest);
+  const auto slice = [&](std::int64_t at) {
+    return between(x, y, right, up, scramble(seed ^ static_cast<std::uint32_t>(at)));
+  };
+  return mix(slice(z.below), slice(z.below + 1), fade(z.rest));
 }
 
-double fraction(double v) noexcept { return v - std::floor(v); }
-std::int64_t whole(double v) noexcept { return static_cast<std::int64_t>(std::floor(v)); }
+double fraction(double v) noexcept { return Split(v).rest; }
+std::int64_t whole(double v) noexcept { return Split(v).below; }
 
 /// Position on the surface [m]; the face tells flat sides apart.
 struct Place {

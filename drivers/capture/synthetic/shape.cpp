@@ -26,6 +26,13 @@ Shape between(ShapeKind kind, Vec3 a, Vec3 b, double radius, Vec3 side, int mate
   return s;
 }
 
+/// Does the ray pass the sphere at a t that is not far before its start?
+bool passes(Vec3 center, double radius, Vec3 origin, Vec3 unit_direction) noexcept {
+  const Vec3 to = center - origin;
+  const double along = dot(to, unit_direction);
+  return along >= -radius && dot(to, to) - along * along <= radius * radius;
+}
+
 }  // namespace
 
 Shape ellipsoid(Vec3 center, const Axes& axes, Vec3 radii, int material) noexcept {
@@ -45,12 +52,20 @@ Shape capsule(Vec3 a, Vec3 b, double radius, Vec3 side, int material) noexcept {
 }
 
 bool blocks(const Shape& shape, Vec3 origin, Vec3 unit_direction) noexcept {
-  const Vec3 to = shape.center - origin;
-  const double along = dot(to, unit_direction);
-  const double radius = shape.bounding_radius;
-  if (along < -radius || dot(to, to) - along * along > radius * radius) return false;
+  if (!passes(shape.center, shape.bounding_radius, origin, unit_direction)) return false;
   const Caster caster(shape);
   return caster.hit(caster.origin(origin), caster.direction(unit_direction)) < kMiss;
+}
+
+Blocker::Blocker(const Shape& shape, Vec3 unit_direction) noexcept
+    : caster_(shape),
+      center_(shape.center),
+      radius_(shape.bounding_radius),
+      toward_(unit_direction),
+      direction_(caster_.direction(unit_direction)) {}
+
+bool Blocker::blocks(Vec3 origin) const noexcept {
+  return passes(center_, radius_, origin, toward_) && caster_.hit(caster_.origin(origin), direction_) < kMiss;
 }
 
 Vec3 local_normal(const Shape& shape, Vec3 p) noexcept {

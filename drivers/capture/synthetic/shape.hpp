@@ -116,6 +116,22 @@ class Caster {
 /// True when the ray meets the shape at a t > 0. A cheap sphere comes first.
 [[nodiscard]] bool blocks(const Shape& shape, Vec3 origin, Vec3 unit_direction) noexcept;
 
+/// The same for many rays of one direction, to the bit.
+class Blocker {
+ public:
+  Blocker() = default;
+  Blocker(const Shape& shape, Vec3 unit_direction) noexcept;
+
+  [[nodiscard]] bool blocks(Vec3 origin) const noexcept;
+
+ private:
+  Caster caster_;
+  Vec3 center_;
+  double radius_ = 0;
+  Vec3 toward_;
+  Vec3 direction_;  ///< toward_ as the caster has it
+};
+
 /// Outward unit normal at a point of the surface; both local.
 [[nodiscard]] Vec3 local_normal(const Shape& shape, Vec3 local) noexcept;
 

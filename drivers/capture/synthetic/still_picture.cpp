@@ -38,15 +38,6 @@ constexpr std::array<Offset, 13> kSunDisc{{{-0.5, -0.5},
                                            {-0.7, 0.6},
                                            {0, 0}}};
 
-/// Two unit directions across a third, and across each other; `side` is level.
-struct Across {
-  explicit Across(Vec3 along) noexcept
-      : side(normalized({along.z, 0, -along.x})),
-        up{along.y * side.z, along.z * side.x - along.x * side.z, -along.y * side.x} {}
-  Vec3 side;
-  Vec3 up;
-};
-
 /// A direction `offset` radii off the middle of the sun.
 Vec3 toward_sun(const Light& light, Offset offset) noexcept {
   const auto [side, up] = Across(light.to_sun);
@@ -78,33 +69,36 @@ Vec3 sky_colour(const Scene& scene, Vec3 direction) noexcept {
   return mix(clear, {0.80, 0.81, 0.83}, 0.65 * smoothstep(-0.1, 0.5, cloud));
 }
 
-/// What stands between points and one place on the sun's disc. Seen from there each shape lies within a circle: few
-/// are left to be met by a ray, and those are the same ones.
+/// What stands between points and one place on the sun's disc. Seen from there each shape lies within a circle, and a
+/// grid tells which circles are near: few are left to be met by a ray.
 class Sunlight {
  public:
-  /// `shaders`: of the scene's statics; outlives this, as the scene does.
-  Sunlight(const Scene& scene, std::span<const std::size_t> shaders, Vec3 toward)
-      : scene_(scene), shaders_(shaders), toward_(toward), across_(toward) {
+  /// `shaders`: of the scene's statics.
+  Sunlight(const Scene& scene, std::span<const std::size_t> shaders, Vec3 toward) : toward_(toward), across_(toward) {
     constexpr double kRounding = 1e-6;  // [m], far more than the sums below lose
     for (const std::size_t i : shaders) {
       const Shape& shape = scene.statics[i];
-      const double radius = shape.bounding_radius + kRounding;
-      circles_.push_back({dot(across_.side, shape.center), dot(across_.up, shape.center), radius * radius});
+      blockers_.emplace_back(shape, toward);
+      circles_.push_back(
+          {dot(across_.side, shape.center), dot(across_.up, shape.center), shape.bounding_radius + kRounding});
     }
+    lay_grid();
   }
 
   [[nodiscard]] Vec3 toward() const noexcept { return toward_; }
 
   /// `last`: index in shaders of what hid the sun from a neighbour, which is likely to hide it again; kept.
   [[nodiscard]] bool is_hidden(Vec3 from, std::size_t& last) const noexcept {
-    if (last < shaders_.size() && blocks(scene_.statics[shaders_[last]], from, toward_)) return true;
+    if (last < blockers_.size() && blockers_[last].blocks(from)) return true;
     const double u = dot(across_.side, from);
     const double v = dot(across_.up, from);
-    for (std::size_t i = 0; i < circles_.size(); ++i) {
+    const auto cell = static_cast<std::size_t>(row_of(v) * kCells + column_of(u));
+    for (std::size_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
+      const std::size_t i = near_[k];
       const Circle& circle = circles_[i];
       const double du = circle.u - u;
       const double dv = circle.v - v;
-      if (du * du + dv * dv > circle.radius2 || !blocks(scene_.statics[shaders_[i]], from, toward_)) continue;
+      if (du * du + dv * dv > circle.radius * circle.radius || !blockers_[i].blocks(from)) continue;
       last = i;
       return true;
     }
@@ -113,14 +107,54 @@ class Sunlight {
 
  private:
   struct Circle {
-    double u, v, radius2;
+    double u, v, radius;
   };
+  static constexpr int kCells = 64;
 
-  const Scene& scene_;
-  std::span<const std::size_t> shaders_;
+  [[nodiscard]] static int index_of(double along) noexcept {
+    return static_cast<int>(clamp(along, 0.0, static_cast<double>(kCells - 1)));
+  }
+  [[nodiscard]] int column_of(double u) const noexcept { return index_of((u - left_) * a_metre_across_); }
+  [[nodiscard]] int row_of(double v) const noexcept { return index_of((v - low_) * a_metre_up_); }
+
+  /// Cells at the border hold what is beyond, too.
+  void lay_grid() {
+    double right = 0;
+    double high = 0;
+    for (const Circle& c : circles_) {
+      left_ = std::min(left_, c.u - c.radius);
+      right = std::max(right, c.u + c.radius);
+      low_ = std::min(low_, c.v - c.radius);
+      high = std::max(high, c.v + c.radius);
+    }
+    a_metre_across_ = kCells / std::max(right - left_, 1.0);
+    a_metre_up_ = kCells / std::max(high - low_, 1.0);
+    std::vector<std::vector<std::size_t>> cells(static_cast<std::size_t>(kCells) * kCells);
+    for (std::size_t i = 0; i < circles_.size(); ++i) {
+      const Circle& c = circles_[i];
+      for (int row = row_of(c.v - c.radius); row <= row_of(c.v + c.radius); ++row) {
+        for (int column = column_of(c.u - c.radius); column <= column_of(c.u + c.radius); ++column) {
+          cells[static_cast<std::size_t>(row * kCells + column)].push_back(i);
+        }
+      }
+    }
+    for (const std::vector<std::size_t>& cell : cells) {
+      starts_.push_back(near_.size());
+      near_.insert(near_.end(), cell.begin(), cell.end());
+    }
+    starts_.push_back(near_.size());
+  }
+
   Vec3 toward_;
   Across across_;
+  std::vector<Blocker> blockers_;  ///< in the order of shaders, as circles_
   std::vector<Circle> circles_;
+  double left_ = 0;
+  double low_ = 0;
+  double a_metre_across_ = 1;
+  double a_metre_up_ = 1;
+  std::vector<std::size_t> starts_;  ///< of each cell in near_, and the end
+  std::vector<std::size_t> near_;    ///< indices of circles_ that reach into a cell
 };
 
 /// Rows from `first` up to `last`.

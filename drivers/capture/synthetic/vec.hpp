@@ -34,6 +34,15 @@ struct Vec3 {
   return t * t * (3.0 - 2.0 * t);
 }
 
+/// Two unit directions across a third, and across each other; `side` is level.
+struct Across {
+  explicit Across(Vec3 along) noexcept
+      : side(normalized({along.z, 0, -along.x})),
+        up{along.y * side.z, along.z * side.x - along.x * side.z, -along.y * side.x} {}
+  Vec3 side;
+  Vec3 up;
+};
+
 /// The unit axes of a body, in world coordinates.
 struct Axes {
   Vec3 x{1, 0, 0};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace stereotrack::capture::synthetic {
 namespace {
@@ -17,8 +18,12 @@ bool may_shade(Vec3 a, double a_radius, Vec3 b, double b_radius, Vec3 to_sun) no
 }  // namespace
 
 View::View(const Scene& scene, const PinholeCamera& camera)
-    : scene_(scene), camera_(camera), frame_{0, 0, camera.width, camera.height} {
+    : scene_(scene), camera_(camera), frame_{0, 0, camera.width, camera.height}, across_sun_(scene.light.to_sun) {
   for (std::size_t s = 0; s < kSamples; ++s) to_sun_[s] = into_sun(scene.light, s);
+  for (const Shape& shape : scene.statics) {
+    auto& blockers = static_blockers_.emplace_back();
+    for (std::size_t s = 0; s < kSamples; ++s) blockers[s] = Blocker(shape, to_sun_[s]);
+  }
   const std::size_t pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   who_.resize(kSamples * pixels);
   shadow_.resize(pixels);
@@ -33,6 +38,23 @@ View::View(const Scene& scene, const PinholeCamera& camera)
   } else {
     cast_still(scene, camera, StillRays::kThirteen, still_);
     depth_ = still_.depth;
+    look_from_sun();
+  }
+}
+
+View::SeenFromSun View::from_sun(Vec3 point) const noexcept {
+  return {static_cast<float>(dot(across_sun_.side, point)), static_cast<float>(dot(across_sun_.up, point)),
+          static_cast<float>(dot(scene_.light.to_sun, point))};
+}
+
+void View::look_from_sun() {
+  seen_from_sun_.resize(still_.center_depth.size());
+  for (int y = 0; y < camera_.height; ++y) {
+    for (int x = 0; x < camera_.width; ++x) {
+      const std::size_t pixel = index(x, y);
+      seen_from_sun_[pixel] =
+          from_sun(camera_.position + camera_.ray(x, y) * static_cast<double>(still_.center_depth[pixel]));
+    }
   }
 }
 
@@ -40,6 +62,7 @@ void View::turn(const PinholeCamera& camera) {
   camera_ = camera;
   turnable_->read(camera, still_);
   depth_ = still_.depth;
+  look_from_sun();
 }
 
 void View::mark(const Rect& box) noexcept {
@@ -73,6 +96,7 @@ void View::cast_actors(std::span<const PosedActor> actors, const PosedFoliage& f
       Part& part = parts_[part_count_++];
       part.shape = shape;
       part.actor = static_cast<int>(a);
+      for (std::size_t s = 0; s < kSamples; ++s) part.blockers[s] = Blocker(shape, to_sun_[s]);
     }
   }
   for (std::size_t p = 0; p < part_count_; ++p) {
@@ -160,12 +184,20 @@ void View::shade_still(const Shape& shape, const Rect& box, std::vector<std::uin
   for (std::size_t s = 0; s < kSamples; ++s) direction[s] = caster.direction(to_sun_[s]);
   constexpr std::uint8_t kAll = (1U << kSamples) - 1;
   const Vec3 sun = scene_.light.to_sun;
+  const SeenFromSun center = from_sun(shape.center);
+  const auto radius = static_cast<float>(shape.bounding_radius) + kRounding;
+  const auto sun_radius = static_cast<float>(scene_.light.sun_radius);
   Rect touched;
   for (int y = box.top; y < box.bottom(); ++y) {
     int low = camera_.width;
     int high = 0;
     for (int x = box.left; x < box.right(); ++x) {
       const std::size_t pixel = index(x, y);
+      const SeenFromSun& seen = seen_from_sun_[pixel];
+      const float du = center.u - seen.u;
+      const float dv = center.v - seen.v;
+      const float within = radius + sun_radius * std::abs(center.w - seen.w);
+      if (du * du + dv * dv > within * within || center.w - seen.w < -within) continue;
       if (bits[pixel] == kAll || still_.sun_light[3 * pixel + 1] <= 0.0F) continue;
       const Vec3 point = camera_.position + camera_.ray(x, y) * static_cast<double>(still_.center_depth[pixel]);
       const Vec3 to = shape.center - point;
@@ -199,9 +231,16 @@ void View::cast_contact(const Shape& sphere) {
   if (box.empty() || sphere.center.y > kReach * r) return;
   dirty_.push_back(box);
   mark(box);
+  const SeenFromSun center = from_sun(sphere.center);
+  const float within = static_cast<float>(kReach * r) + kRounding;
   for (int y = box.top; y < box.bottom(); ++y) {
     for (int x = box.left; x < box.right(); ++x) {
       const std::size_t pixel = index(x, y);
+      const SeenFromSun& seen = seen_from_sun_[pixel];
+      const float du = center.u - seen.u;
+      const float dv = center.v - seen.v;
+      const float dw = center.w - seen.w;
+      if (du * du + dv * dv + dw * dw > within * within) continue;
       const Vec3 point = camera_.position + camera_.ray(x, y) * static_cast<double>(still_.center_depth[pixel]);
       const Vec3 to = sphere.center - point;
       const double d2 = std::max(dot(to, to), r * r);
@@ -254,9 +293,9 @@ Vec3 View::shade(const Part& part, std::size_t sample, double u, double v, doubl
   if (facing > 0) {
     const Vec3 above = point + normal * 2e-3;
     const bool hidden = std::any_of(part.shaders.begin(), part.shaders.end(),
-                                    [&](std::uint16_t i) { return blocks(parts_[i].shape, above, to_sun_[sample]); }) ||
+                                    [&](std::uint16_t i) { return parts_[i].blockers[sample].blocks(above); }) ||
                         std::any_of(part.static_shaders.begin(), part.static_shaders.end(),
-                                    [&](std::uint16_t i) { return blocks(scene_.statics[i], above, to_sun_[sample]); });
+                                    [&](std::uint16_t i) { return static_blockers_[i][sample].blocks(above); });
     if (!hidden) light = light + scene_.light.sun * (facing * level.sun);
   }
   if (lamp_ > 0) light = light + scene_.lamp->on(point, normal) * level.lamp;
@@ -274,6 +313,17 @@ Vec3 View::shade(const PosedLeaf& leaf, std::size_t sample, double u, double v, 
   const double facing = dot(normal, to_sun_[sample]);
   const double sun = leaf.lit * level.sun * (facing > 0 ? facing : -0.42 * facing);
   return colour * (skylight(scene_.light, normal) * (leaf.open * level.sky) + scene_.light.sun * sun);
+}
+
+/// What shadow() of (x - 1, y), (x, y) and (x + 1, y) reads in column x, in one.
+unsigned View::shadows_of_column(int x, int y) const noexcept {
+  const int column = std::clamp(x, 0, camera_.width - 1);
+  unsigned bits = 0;
+  for (int row = std::max(y - 1, 0); row <= std::min(y + 1, camera_.height - 1); ++row) {
+    bits |= shadow_[index(column, row)];
+    if (!leaf_shadow_.empty()) bits |= leaf_shadow_[index(column, row)];
+  }
+  return bits;
 }
 
 /// Hidden part of the sun, smoothed with 1 2 1 in x and y.
@@ -340,8 +390,16 @@ void View::light_row(int y, const LightLevel& level) noexcept {
     for (std::size_t i = 0; i < row_.size(); ++i) row_[i] += still_.lamp_light[start + i] * lamp_;
   }
   const auto [first, last] = row_span_[static_cast<std::size_t>(y)];
+  unsigned before = first < last ? shadows_of_column(first - 1, y) : 0;
+  unsigned here = first < last ? shadows_of_column(first, y) : 0;
   for (int x = first; x < last; ++x) {
     const std::size_t pixel = index(x, y);
+    const unsigned after = shadows_of_column(x + 1, y);
+    const unsigned shadows = before | here | after;
+    before = std::exchange(here, after);
+    const std::uint16_t* who = &who_[kSamples * pixel];
+    const bool is_still = std::all_of(who, who + kSamples, [](std::uint16_t one) { return one == 0; });
+    if (shadows == 0 && contact_[pixel] == 0 && is_still) continue;
     const auto lit = static_cast<float>(level.sun * (1.0 - shadow(x, y, Shaders::kAll)));
     const auto open = static_cast<float>(level.sky * (1.0 - contact_[pixel] / 255.0));
     const std::size_t out = 3 * static_cast<std::size_t>(x);
@@ -352,7 +410,7 @@ void View::light_row(int y, const LightLevel& level) noexcept {
       const float lamp = lamp_ * (1.0F - static_cast<float>(contact_[pixel]) / 255.0F);
       for (std::size_t c = 0; c < 3; ++c) row_[out + c] += still_.lamp_light[3 * pixel + c] * lamp;
     }
-    const std::uint16_t* who = &who_[kSamples * pixel];
+    if (is_still) continue;
     Vec3 sum;
     int covered = 0;
     for (std::size_t s = 0; s < kSamples; ++s) {
@@ -364,7 +422,6 @@ void View::light_row(int y, const LightLevel& level) noexcept {
       sum = sum + (who[s] >= kFirstLeaf ? shade(leaves_[who[s] - kFirstLeaf], s, u, v, depth, level)
                                         : shade(parts_[who[s] - 1U], s, u, v, depth, level));
     }
-    if (covered == 0) continue;
     const float still = static_cast<float>(static_cast<int>(kSamples) - covered) / kSamples;
     row_[out] = row_[out] * still + static_cast<float>(sum.x / kSamples);
     row_[out + 1] = row_[out + 1] * still + static_cast<float>(sum.y / kSamples);

@@ -25,7 +25,7 @@ struct LightLevel {
 /// four a pixel for objects (shape, texture, sun, shadows of everything else), four towards the sun for
 /// shadows on what stands still.
 ///
-/// Memory: about 90 bytes a pixel. One thread an instance.
+/// Memory: about 100 bytes a pixel. One thread an instance.
 class View {
  public:
   View(const Scene& scene, const PinholeCamera& camera);
@@ -70,7 +70,16 @@ class View {
     int actor = 0;
     std::vector<std::uint16_t> shaders;         ///< parts that may stand between it and the sun
     std::vector<std::uint16_t> static_shaders;  ///< the same of what stands still
+    std::array<Blocker, kSamples> blockers;     ///< towards to_sun_
   };
+
+  /// A point of what stands still: metres across, up and towards the sun. Rounded: to leave out, not to decide.
+  struct SeenFromSun {
+    float u = 0;
+    float v = 0;
+    float w = 0;
+  };
+  static constexpr float kRounding = 1e-3F;  ///< [m], far more than the above loses
 
   /// What hides the sun: actors where no leaf does it already.
   enum class Shaders { kAll, kActors, kLeaves };
@@ -78,7 +87,10 @@ class View {
   static constexpr std::uint16_t kFirstLeaf = 0x4000;
   static_assert(kFirstLeaf + Foliage::kMostLeaves < 0x10000);
 
+  void look_from_sun();
+  [[nodiscard]] SeenFromSun from_sun(Vec3 point) const noexcept;
   void light_row(int y, const LightLevel& level) noexcept;  ///< fills row_
+  [[nodiscard]] unsigned shadows_of_column(int x, int y) const noexcept;
   void cast_leaves(const PosedFoliage& foliage);
   void cast_shadow(const Part& part);
   void shade_still(const Shape& shape, const Rect& box, std::vector<std::uint8_t>& bits);
@@ -97,10 +109,13 @@ class View {
   const Scene& scene_;
   PinholeCamera camera_;
   Rect frame_;
-  std::array<Vec3, kSamples> to_sun_;  ///< directions into the sun's disc, unit
+  Across across_sun_;
+  std::array<Vec3, kSamples> to_sun_;                           ///< directions into the sun's disc, unit
+  std::vector<std::array<Blocker, kSamples>> static_blockers_;  ///< of the scene's statics, towards to_sun_
 
-  StillPicture still_;                     ///< as camera_ sees it now
-  std::optional<TurnableStill> turnable_;  ///< where the scene sways
+  StillPicture still_;                      ///< as camera_ sees it now
+  std::vector<SeenFromSun> seen_from_sun_;  ///< a pixel's centre of still_
+  std::optional<TurnableStill> turnable_;   ///< where the scene sways
 
   // This frame, per pixel.
   std::vector<float> depth_;           ///< kSamples
