@@ -33,7 +33,7 @@ std::uint64_t last_session(const std::filesystem::path& path) {
   if (size > 0 && end[-1] == '\n') --end;
   std::uint64_t number = 0;
   const auto [parsed, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc{} || parsed != end || size == text.size() ||
+  if (error != std::errc{} || parsed != end || size == std::ssize(text) ||
       number == std::numeric_limits<std::uint64_t>::max()) {
     throw SessionError(path.string() +
                        ": does not hold the number of the last session; write one that is higher than receivers have "

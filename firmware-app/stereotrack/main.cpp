@@ -12,7 +12,9 @@
 #include "firmware-app/stereotrack/disparity.hpp"
 #include "firmware-app/stereotrack/doctor/doctor.hpp"
 #include "firmware-app/stereotrack/eval.hpp"
+#include "firmware-app/stereotrack/info.hpp"
 #include "firmware-app/stereotrack/monitor.hpp"
+#include "firmware-app/stereotrack/plan.hpp"
 #include "firmware-app/stereotrack/replay.hpp"
 #include "firmware-app/stereotrack/synth.hpp"
 #include "pipeline/core/simd.hpp"
@@ -41,6 +43,32 @@ void add_synth_options(CLI::App& command, stereotrack::SynthArguments& arguments
   command.add_option("--seed", arguments.seed, "another seed, another drawing of the scene")->capture_default_str();
   command.add_option("--frames", arguments.frames, "how many pairs")->capture_default_str();
   command.add_option("--size", arguments.size, "WIDTHxHEIGHT of a picture")->capture_default_str();
+}
+
+void add_plan_options(CLI::App& command, stereotrack::PlanArguments& arguments) {
+  const CLI::Range positive(1e-6, 1e6);
+  command.add_option("--range", arguments.range_m, "metres: the farthest that targets are to be measured")
+      ->required()
+      ->check(positive);
+  command.add_option("--accuracy", arguments.accuracy_m, "metres: standard deviation of their distance there")
+      ->required()
+      ->check(positive);
+  command.add_option("--size", arguments.size, "WIDTHxHEIGHT of the sensor")->capture_default_str();
+  command.add_option("--view", arguments.view_deg, "degrees across that the lens sees; else usual ones")
+      ->check(CLI::Range(1.0, 170.0));
+  command.add_option("--baseline", arguments.baseline_m, "metres that the rig has; else what is needed")
+      ->check(positive);
+  command
+      .add_option("--disparity-error", arguments.disparity_error_px,
+                  "pixels: standard deviation of a target's disparity")
+      ->check(positive)
+      ->capture_default_str();
+  command.add_option("--target", arguments.target_m, "metres: width of the smallest target")
+      ->check(positive)
+      ->capture_default_str();
+  command.add_option("--speed", arguments.speed_m_s, "metres a second: of the fastest target, across the view")
+      ->check(positive)
+      ->capture_default_str();
 }
 
 void add_doctor_options(CLI::App& command, stereotrack::DoctorArguments& arguments) {
@@ -140,6 +168,14 @@ int run(int argc, char** argv) {
   disparity_command->add_option("--config", disparity_config, "configuration (TOML)");
   disparity_command->add_option("--set", disparity_set, "KEY=VALUE")->allow_extra_args(false);
 
+  stereotrack::InfoArguments info;
+  app.add_subcommand("info", "tells what a recording holds, and whether it is whole")
+      ->add_option("recording", info.recording, "FILE.strec")
+      ->required();
+
+  stereotrack::PlanArguments plan;
+  add_plan_options(*app.add_subcommand("plan", "which lens and baseline a range and an accuracy ask for"), plan);
+
   stereotrack::MonitorArguments monitor;
   CLI::App* monitor_command = app.add_subcommand("monitor", "receives and shows the telemetry");
   monitor_command->add_option("--listen", monitor.listen, "ADDR:PORT")->capture_default_str();
@@ -182,6 +218,8 @@ int run(int argc, char** argv) {
     return stereotrack::run_disparity(disparity, stereotrack::load_configuration(disparity_config, disparity_set),
                                       std::cerr);
   }
+  if (app.got_subcommand("info")) return stereotrack::run_info(info, std::cout);
+  if (app.got_subcommand("plan")) return stereotrack::run_plan(plan, std::cout);
   if (*doctor_command) return stereotrack::run_doctor(doctor, std::cout, std::cerr);
   monitor.live = isatty(STDOUT_FILENO) == 1;
   return stereotrack::run_monitor(monitor, std::cout, std::cerr);

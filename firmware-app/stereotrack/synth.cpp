@@ -2,14 +2,12 @@
 
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <future>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <optional>
 #include <regex>
 #include <set>
 #include <stdexcept>
@@ -23,6 +21,7 @@
 #include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrack/interrupt.hpp"
 #include "firmware-app/stereotrack/output_file.hpp"
+#include "firmware-app/stereotrack/picture_size.hpp"
 #include "firmware-app/stereotrack/progress.hpp"
 #include "firmware-app/stereotrack/truth_file.hpp"
 
@@ -32,23 +31,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<const char*, 4> kFolders{"left", "right", "masks", "disparity"};
-
-std::optional<int> whole_number(std::string_view text) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
-std::pair<int, int> parse_size(const std::string& text) {
-  const std::size_t by = text.find('x');
-  if (by != std::string::npos) {
-    const std::optional<int> width = whole_number(std::string_view(text).substr(0, by));
-    const std::optional<int> height = whole_number(std::string_view(text).substr(by + 1));
-    if (width && height) return {*width, *height};
-  }
-  throw config::Error("--size " + text + ": is not WIDTHxHEIGHT, like 640x480");
-}
 
 std::string numbered(std::uint64_t ordinal) {
   return formatted("%06llu.png", static_cast<unsigned long long>(ordinal));
@@ -150,7 +132,9 @@ int run_synth(const SynthArguments& arguments, std::ostream& messages) {
   capture::SyntheticOptions options;
   options.seed = arguments.seed;
   options.frames = arguments.frames;
-  std::tie(options.width, options.height) = parse_size(arguments.size);
+  const PictureSize size = parse_picture_size(arguments.size);
+  options.width = size.width;
+  options.height = size.height;
   options.truth = true;
   std::unique_ptr<capture::SyntheticSource> source;
   try {

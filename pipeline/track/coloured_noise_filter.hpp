@@ -1,11 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <cstddef>
 
 #include "pipeline/core/pinned_math.hpp"
 #include "pipeline/core/result.hpp"
+#include "pipeline/track/innovation.hpp"
 
 namespace stereotrack {
 
@@ -31,11 +31,6 @@ class ColouredNoiseFilter {
   /// the variance of a target's error, two thirds are still there after a frame of 1/30 s and a third after five.
   static constexpr double kSlowPart = 0.7;
   static constexpr double kSlow_s = 0.2;
-
-  struct Innovation {
-    Vector y;  ///< (3.28)
-    Matrix S;  ///< (3.29)
-  };
 
   /// A first measurement of position with covariance R; velocity about `velocity`, known within velocity_sd.
   void start(const Vector& z, const Matrix& R, double velocity_sd, const Vector& velocity) noexcept {
@@ -87,21 +82,18 @@ class ColouredNoiseFilter {
     block(kError, kVelocity) = block(kVelocity, kError).transpose();
   }
 
-  [[nodiscard]] Innovation innovation(const Vector& z, const Matrix& R) const noexcept {
+  [[nodiscard]] Innovation<D> innovation(const Vector& z, const Matrix& R) const noexcept {
     return {z - expected(), expected_covariance() + (1 - kSlowPart) * R};
   }
 
   /// (3.28)-(3.32). Faults, state untouched: kNotFinite (z or R), kSingular (S).
-  [[nodiscard]] Result<Innovation> update(const Vector& z, const Matrix& R) noexcept {
-    if (!z.allFinite() || !R.allFinite()) return fail(Fault::kNotFinite);
-    const Innovation innovation = this->innovation(z, R);
-    Matrix S_inverse;
-    bool invertible = false;
-    innovation.S.computeInverseWithCheck(S_inverse, invertible, 1e-300);
-    if (!invertible) return fail(Fault::kSingular);
+  [[nodiscard]] Result<Innovation<D>> update(const Vector& z, const Matrix& R) noexcept {
+    const Innovation<D> innovation = this->innovation(z, R);
+    const Result<Matrix> S_inverse = innovation.inverse();
+    if (!S_inverse) return fail(S_inverse.error());
     using Gain = Eigen::Matrix<double, 3 * D, D>;
     const Gain U = P_.template leftCols<D>() + P_.template rightCols<D>();
-    const Gain K = U * S_inverse;
+    const Gain K = U * *S_inverse;
     x_ += K * innovation.y;
     const Covariance AP = P_ - K.lazyProduct(U.transpose());  // the other product may ask for heap
     const Gain APH = AP.template leftCols<D>() + AP.template rightCols<D>();

@@ -30,7 +30,6 @@ class InteractingModels {
   using Filter = ColouredNoiseFilter<D>;
   using Vector = typename Filter::Vector;
   using Matrix = typename Filter::Matrix;
-  using Innovation = typename Filter::Innovation;
   static constexpr std::size_t kMost = 3;
 
   struct Model {
@@ -71,21 +70,20 @@ class InteractingModels {
   }
 
   /// Of all models together.
-  [[nodiscard]] Innovation innovation(const Vector& z, const Matrix& R) const noexcept {
+  [[nodiscard]] Innovation<D> innovation(const Vector& z, const Matrix& R) const noexcept {
     return combined_.innovation(z, R);
   }
 
   /// Faults, state untouched: kNotFinite (z or R), kSingular (S of a model).
-  [[nodiscard]] Result<Innovation> update(const Vector& z, const Matrix& R) noexcept {
-    const Innovation innovation = this->innovation(z, R);
+  [[nodiscard]] Result<void> update(const Vector& z, const Matrix& R) noexcept {
     std::array<Filter, kMost> updated = filters_;
     std::array<double, kMost> distance{};  // squared Mahalanobis
     std::array<double, kMost> volume{};    // determinant of S
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t j = 0; j < count_; ++j) {
-      const Result<Innovation> one = updated[j].update(z, R);
+      const Result<Innovation<D>> one = updated[j].update(z, R);
       if (!one) return fail(one.error());
-      distance[j] = one->y.dot(one->S.inverse() * one->y);
+      distance[j] = one->squared_distance();
       volume[j] = one->S.determinant();
       if (!std::isfinite(distance[j]) || !(volume[j] > 0)) return fail(Fault::kSingular);
       least = std::min(least, distance[j]);
@@ -100,7 +98,7 @@ class InteractingModels {
     }
     for (double& probability : probabilities_) probability /= sum;
     combine();
-    return innovation;
+    return {};
   }
 
   [[nodiscard]] Vector position() const noexcept { return combined_.position(); }

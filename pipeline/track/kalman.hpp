@@ -1,9 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "pipeline/core/result.hpp"
+#include "pipeline/track/innovation.hpp"
 
 namespace stereotrack {
 
@@ -31,11 +31,6 @@ class ConstantVelocityFilter {
   using Matrix = Eigen::Matrix<double, D, D>;
   using State = Eigen::Matrix<double, 2 * D, 1>;
   using Covariance = Eigen::Matrix<double, 2 * D, 2 * D>;
-
-  struct Innovation {
-    Vector y;  ///< (3.28)
-    Matrix S;  ///< (3.29)
-  };
 
   /// A first measurement of position with covariance R; velocity about `velocity`, known within velocity_sd.
   void start(const Vector& z, const Matrix& R, double velocity_sd, const Vector& velocity = Vector::Zero()) noexcept {
@@ -69,19 +64,16 @@ class ConstantVelocityFilter {
     P_ = (F * P_ * F.transpose() + Q).eval();
   }
 
-  [[nodiscard]] Innovation innovation(const Vector& z, const Matrix& R) const noexcept {
+  [[nodiscard]] Innovation<D> innovation(const Vector& z, const Matrix& R) const noexcept {
     return {z - position(), position_covariance() + R};
   }
 
   /// (3.28)-(3.32). Faults, state untouched: kNotFinite (z or R), kSingular (S).
-  [[nodiscard]] Result<Innovation> update(const Vector& z, const Matrix& R) noexcept {
-    if (!z.allFinite() || !R.allFinite()) return fail(Fault::kNotFinite);
-    const Innovation innovation = this->innovation(z, R);
-    Matrix S_inverse;
-    bool invertible = false;
-    innovation.S.computeInverseWithCheck(S_inverse, invertible, 1e-300);
-    if (!invertible) return fail(Fault::kSingular);
-    const Eigen::Matrix<double, 2 * D, D> K = P_.template leftCols<D>() * S_inverse;
+  [[nodiscard]] Result<Innovation<D>> update(const Vector& z, const Matrix& R) noexcept {
+    const Innovation<D> innovation = this->innovation(z, R);
+    const Result<Matrix> S_inverse = innovation.inverse();
+    if (!S_inverse) return fail(S_inverse.error());
+    const Eigen::Matrix<double, 2 * D, D> K = P_.template leftCols<D>() * *S_inverse;
     Covariance rest = Covariance::Identity();
     rest.template leftCols<D>() -= K;
     x_ = (x_ + K * innovation.y).eval();

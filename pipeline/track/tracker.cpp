@@ -477,10 +477,9 @@ void Tracker::measure_in_space(Target& target, const Detection& detection) const
   const Eigen::Vector3d& z = detection.position;
   const Eigen::Matrix3d& R = detection.position_covariance;
   (void)target.space.update(z, R);
-  const auto expected = target.motion.innovation(z, R);
   // Half of something else, or a false match: what lies that far off is believed that much less. What is large changes
   // its depth from frame to frame.
-  const double far = is_large(detection.box) ? 0 : expected.y.dot(expected.S.inverse() * expected.y);
+  const double far = is_large(detection.box) ? 0 : target.motion.innovation(z, R).squared_distance();
   (void)target.motion.update(z, R * std::max(far / kDoubtful, 1.0));
 }
 

@@ -1,5 +1,6 @@
 // What a run did, with frames lost and messages late as they come in life, is what `stereotrack replay` of its
 // recording does: tracks.csv and telemetry.bin, byte for byte.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -175,6 +176,44 @@ TEST_P(RecordingOf, ARunReplaysItsTracksAndTelemetryByteForByte) {
   EXPECT_EQ(tracks, read_text(folder / "tracks.csv"));
   EXPECT_TRUE(read_text(folder / "out" / "telemetry.bin") == read_text(folder / "telemetry.bin"));
   EXPECT_GT(fs::file_size(folder / "telemetry.bin"), 4000U);
+}
+
+TEST(CommandInfo, TellsWhatARecordingHoldsAndWhatIsDamaged) {
+  const TempDir folder;
+  LiveRun live({}, folder.path(), {.seconds = 2, .seconds_after = 0.7});
+  live.run(85);
+  record::RecordingSource source(live.recording());
+  std::vector<std::uint64_t> ordinals;
+  for (FramePair pair; source.next(pair) == capture::Next::kPair;) ordinals.push_back(pair.ordinal);
+  ASSERT_GT(ordinals.size(), 40U);
+  const std::string size = std::to_string(ordinals.size());
+  const std::uint64_t missing = ordinals.back() - ordinals.front() + 1 - ordinals.size();
+  EXPECT_GT(missing, 1U);
+  ProgramResult info = stereotrack_command({"info", live.recording()});
+  EXPECT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_EQ(info.err, "");
+  for (const std::string& said :
+       {std::string("by test, cause deadline"), std::string("rig 41, session "), std::string("source synthetic:eleven"),
+        std::string("320x240 bgr8, stereo"), size + ", pairs " + std::to_string(ordinals.front()) + " to ",
+        std::to_string(missing) + " missing between them, 0 damaged", std::string("level_set corners"),
+        std::string("messages   ") + std::to_string(source.outputs().size()) + ", of which 0 predicted",
+        std::string("gives the run's bytes")}) {
+    EXPECT_THAT(info.out, testing::HasSubstr(said));
+  }
+  EXPECT_THAT(info.out, testing::ContainsRegex("targets    [1-9][0-9]*, at most [1-9]"));
+
+  fs::resize_file(live.recording(), fs::file_size(live.recording()) / 2);
+  info = stereotrack_command({"info", live.recording()});
+  EXPECT_EQ(info.exit_code, 1);
+  EXPECT_THAT(info.out, testing::HasSubstr("cut or damaged after byte"));
+
+  for (const char* other : {"nowhere.strec", "pictures.png"}) {
+    info = stereotrack_command({"info", other});
+    EXPECT_EQ(info.exit_code, 1);
+    EXPECT_EQ(info.out, "");
+    EXPECT_TRUE(is_one_line(info.err)) << info.err;
+    EXPECT_THAT(info.err, testing::HasSubstr(other));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Presets, RecordingOf, testing::Values("robust", "thesis"));

@@ -27,7 +27,7 @@ double cell(std::int64_t x, std::int64_t y, std::int64_t z, std::uint32_t seed) 
 
 double fade(double t) noexcept { return t * t * (3.0 - 2.0 * t); }
 
-/// The whole part below and the rest, for |v| < 2^63; a call of std::floor takes longer than all else here on x86-64.
+/// The whole part below and the rest, for |v| < 2^63: a call of std::floor takes longer on x86-64.
 struct Split {
   explicit Split(double v) noexcept : below(static_cast<std::int64_t>(v)) {
     if (static_cast<double>(below) > v) --below;

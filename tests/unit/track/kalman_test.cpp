@@ -11,6 +11,8 @@
 #include <opencv2/video/tracking.hpp>
 #include <random>
 
+#include "tests/unit/track/correlated_error.hpp"
+
 namespace stereotrack {
 namespace {
 
@@ -18,15 +20,11 @@ using Filter1 = ConstantVelocityFilter<1>;
 using Filter3 = ConstantVelocityFilter<3>;
 using Vector1 = Filter1::Vector;
 using Vector6 = Filter3::State;
+using test::normal3;
 
 double normal(std::mt19937& random) {
   std::normal_distribution<double> standard;
   return standard(random);
-}
-Eigen::Vector3d normal3(std::mt19937& random) {
-  Eigen::Vector3d out;
-  for (int i = 0; i < 3; ++i) out(i) = normal(random);
-  return out;
 }
 Eigen::Matrix3d random_covariance(std::mt19937& random) {
   Eigen::Matrix3d root;
