@@ -69,7 +69,7 @@ TEST(ColouredNoiseFilter, AgreesWithOpencvsFilterOfTheSameNineStates) {
       cv::Mat z_cv;
       cv::eigen2cv(z, z_cv);
       theirs.correct(z_cv);
-      const Filter3::Innovation alone = ours.innovation(z, R);
+      const Innovation<3> alone = ours.innovation(z, R);
       const auto updated = ours.update(z, R);
       ASSERT_TRUE(updated.has_value());
       EXPECT_EQ(alone.y, updated->y);

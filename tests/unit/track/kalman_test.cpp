@@ -76,7 +76,7 @@ TEST(Kalman, InnovationIsThatOfTheUpdateAndChangesNothing) {
   const Vector6 before = state_of(filter);
   const Eigen::Vector3d z(2, 2, 5);
   const Eigen::Matrix3d R = 0.3 * Eigen::Matrix3d::Identity();
-  const Filter3::Innovation alone = filter.innovation(z, R);
+  const Innovation<3> alone = filter.innovation(z, R);
   EXPECT_EQ(state_of(filter), before);
   const auto updated = filter.update(z, R);
   ASSERT_TRUE(updated.has_value());
