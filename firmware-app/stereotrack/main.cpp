@@ -9,6 +9,7 @@
 #include "drivers/telemetry/authentication.hpp"
 #include "drivers/telemetry/endpoint.hpp"
 #include "drivers/telemetry/replay_guard.hpp"
+#include "firmware-app/formatted.hpp"
 #include "firmware-app/stereotrack/disparity.hpp"
 #include "firmware-app/stereotrack/doctor/doctor.hpp"
 #include "firmware-app/stereotrack/eval.hpp"
@@ -23,6 +24,17 @@ namespace {
 
 constexpr int kFailed = 1;
 constexpr int kBadUsage = 2;
+
+/// CLI::Range also takes what is not a number.
+CLI::Validator within(double low, double high) {
+  const std::string range = stereotrack::formatted("%g to %g", low, high);
+  const auto refuse = [low, high, range](const std::string& text) {
+    double value = 0;
+    const bool is_within = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+    return is_within ? std::string() : text + " is not within " + range;
+  };
+  return {refuse, "FLOAT in [" + range + "]"};
+}
 
 void add_rig_options(CLI::App& command, stereotrack::RigArguments& rig) {
   command
@@ -46,7 +58,7 @@ void add_synth_options(CLI::App& command, stereotrack::SynthArguments& arguments
 }
 
 void add_plan_options(CLI::App& command, stereotrack::PlanArguments& arguments) {
-  const CLI::Range positive(1e-6, 1e6);
+  const CLI::Validator positive = within(1e-6, 1e6);
   command.add_option("--range", arguments.range_m, "metres: the farthest that targets are to be measured")
       ->required()
       ->check(positive);
@@ -55,7 +67,7 @@ void add_plan_options(CLI::App& command, stereotrack::PlanArguments& arguments) 
       ->check(positive);
   command.add_option("--size", arguments.size, "WIDTHxHEIGHT of the sensor")->capture_default_str();
   command.add_option("--view", arguments.view_deg, "degrees across that the lens sees; else usual ones")
-      ->check(CLI::Range(1.0, 170.0));
+      ->check(within(1, 170));
   command.add_option("--baseline", arguments.baseline_m, "metres that the rig has; else what is needed")
       ->check(positive);
   command
@@ -77,7 +89,7 @@ void add_doctor_options(CLI::App& command, stereotrack::DoctorArguments& argumen
   CLI::Option* measure =
       command.add_flag("!--no-measure", arguments.measure, "only looks: opens no camera but to check");
   command.add_option("--seconds", arguments.seconds, "of each measurement")
-      ->check(CLI::Range(0.1, 3600.0))
+      ->check(within(0.1, 3600))
       ->capture_default_str()
       ->excludes(measure);
   command
@@ -146,7 +158,7 @@ int run(int argc, char** argv) {
   eval_command->add_option("--truth", eval.truth, "ground truth, MOT columns")->required();
   eval_command->add_option("--tracks", eval.tracks, "tracks, MOT columns")->required();
   eval_command->add_option("--fps", eval.fps, "frames a second: for velocities and false tracks a minute")
-      ->check(CLI::Range(0.001, 100000.0))
+      ->check(within(0.001, 100000))
       ->capture_default_str();
   eval_command
       ->add_option("--frames", eval.frames, "how many frames the sequence has; 0: up to the last in either file")
@@ -155,7 +167,7 @@ int run(int argc, char** argv) {
   eval_command
       ->add_option("--focal-baseline", eval.focal_baseline,
                    "focal length times baseline, pixels times the files' unit: compares 3-D errors with the geometry's")
-      ->check(CLI::Range(0.0, 1e12));
+      ->check(within(0, 1e12));
   eval_command->add_flag("--json", eval.json, "one JSON object instead of the table");
 
   stereotrack::DisparityArguments disparity;

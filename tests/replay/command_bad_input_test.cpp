@@ -158,6 +158,7 @@ TEST_F(BadInput, WrongUsageExitsWithTwo) {
   expect_refused({"replay"}, kBadUsage, {"source"});
   expect_refused(replay({"--pace", "fast"}), kBadUsage, {"--pace", "fast"});
   expect_refused(replay({"--simd", "mmx"}), kBadUsage, {"--simd mmx", "scalar"});
+  expect_refused({"eval", "--truth", "a", "--tracks", "b", "--fps", "nan"}, kBadUsage, {"--fps", "nan"});
   for (const char* frames : {"5:2", "0:3", "a:b", "1:2:3", "-1"}) {
     expect_refused(replay({"--frames=" + std::string(frames)}), kBadUsage, {"--frames"});
   }
