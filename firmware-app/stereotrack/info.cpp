@@ -22,7 +22,7 @@
 namespace stereotrack {
 namespace {
 
-using unsigned_long = unsigned long long;  // what printf wants of 64 bits
+using PrintedU64 = unsigned long long;  // what %llu takes
 
 struct Seen {
   std::uint64_t first = 0;
@@ -114,7 +114,7 @@ Frames read_frames(record::RecordingSource& recording) {
 
 void print_run(const record::About& about, std::ostream& out) {
   out << "  written    by " << about.program << ", cause " << about.cause << '\n';
-  out << formatted("  run        rig %u, session %llu, source ", about.rig, static_cast<unsigned_long>(about.session))
+  out << formatted("  run        rig %u, session %llu, source ", about.rig, static_cast<PrintedU64>(about.session))
       << about.source << '\n';
   out << formatted("  pictures   %dx%d ", about.width, about.height) << capture::name_of(about.format)
       << (about.stereo ? ", stereo" : ", mono");
@@ -125,11 +125,11 @@ void print_run(const record::About& about, std::ostream& out) {
 
 void print_frames(const Frames& frames, std::ostream& out) {
   const double span_s = std::chrono::duration<double>(frames.end - frames.begin).count();
-  out << formatted("  frames     %llu, pairs %llu to %llu, %.2f s", static_cast<unsigned_long>(frames.whole),
-                   static_cast<unsigned_long>(frames.first), static_cast<unsigned_long>(frames.last), span_s);
+  out << formatted("  frames     %llu, pairs %llu to %llu, %.2f s", static_cast<PrintedU64>(frames.whole),
+                   static_cast<PrintedU64>(frames.first), static_cast<PrintedU64>(frames.last), span_s);
   if (frames.whole > 1 && span_s > 0)
     out << formatted(", %.1f a second", static_cast<double>(frames.whole - 1) / span_s);
-  out << formatted("; %llu missing between them, %zu damaged\n", static_cast<unsigned_long>(frames.missing),
+  out << formatted("; %llu missing between them, %zu damaged\n", static_cast<PrintedU64>(frames.missing),
                    frames.damaged.size());
   if (!frames.skews_ms.empty()) {
     std::vector<double> sorted = frames.skews_ms;
@@ -138,11 +138,11 @@ void print_frames(const Frames& frames, std::ostream& out) {
   }
   if (frames.slowest_us > 0) {
     out << formatted("  slowest    pair %llu, %.2f ms in the pipeline, of which %s %.2f ms\n",
-                     static_cast<unsigned_long>(frames.slowest), frames.slowest_us / 1e3,
-                     to_string(frames.slowest_stage), frames.slowest_stage_us / 1e3);
+                     static_cast<PrintedU64>(frames.slowest), frames.slowest_us / 1e3, to_string(frames.slowest_stage),
+                     frames.slowest_stage_us / 1e3);
   }
   if (frames.shedding > 0) {
-    out << formatted("  shed       in %llu frames:", static_cast<unsigned_long>(frames.shedding));
+    out << formatted("  shed       in %llu frames:", static_cast<PrintedU64>(frames.shedding));
     for (std::size_t i = 0; i < kEfforts; ++i) {
       const auto effort = static_cast<Effort>(i);
       if (leaves_out(frames.shed, effort)) out << ' ' << to_string(effort);
@@ -155,8 +155,8 @@ void print_targets(const Frames& frames, std::ostream& out) {
   out << formatted("  targets    %zu, at most %zu at once\n", frames.targets.size(), frames.most_targets);
   for (const auto& [id, seen] : frames.targets) {
     out << formatted("             %u in pairs %llu to %llu, in %llu of them\n", id,
-                     static_cast<unsigned_long>(seen.first), static_cast<unsigned_long>(seen.last),
-                     static_cast<unsigned_long>(seen.frames));
+                     static_cast<PrintedU64>(seen.first), static_cast<PrintedU64>(seen.last),
+                     static_cast<PrintedU64>(seen.frames));
   }
 }
 
@@ -172,7 +172,7 @@ void print_messages(std::span<const record::OutputNote> notes, std::ostream& out
     missing += note.kind == static_cast<std::uint32_t>(runtime::OutputSchedule::Kind::kMissing) ? 1 : 0;
   }
   out << formatted("  messages   %zu, of which %llu predicted because the result was late, %llu without a pair\n",
-                   notes.size(), static_cast<unsigned_long>(predicted), static_cast<unsigned_long>(missing));
+                   notes.size(), static_cast<PrintedU64>(predicted), static_cast<PrintedU64>(missing));
 }
 
 }  // namespace
