@@ -29,7 +29,7 @@ void open_recording(const std::string& path, Rig& rig) {
   rig.source = std::move(recording);
 }
 
-void open_scene(const std::string& name, bool truth, Rig& rig) {
+void open_scene(const std::string& name, Rig& rig, bool truth) {
   const config::Configuration& configuration = rig.configuration();
   capture::SyntheticOptions options;
   options.fps = configuration.source.fps;

@@ -49,7 +49,7 @@ void open_recording(const std::string& path, Rig& rig);
 
 /// Draws synthetic:NAME, which brings its calibration, as [synthetic] and source.fps say; `truth`: and works out its
 /// ground truth for every pair.
-void open_scene(const std::string& name, bool truth, Rig& rig);
+void open_scene(const std::string& name, Rig& rig, bool truth = false);
 
 /// The calibration of a stereo source.
 void read_calibration(const std::string& path, const calibration::ReadOptions& options, Rig& rig);

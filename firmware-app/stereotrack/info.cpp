@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <map>
 #include <numeric>
 #include <ostream>
@@ -16,6 +15,7 @@
 #include "drivers/record/recording_source.hpp"
 #include "firmware-app/formatted.hpp"
 #include "firmware-app/runtime/output_schedule.hpp"
+#include "firmware-app/stereotrack/summary.hpp"
 #include "pipeline/effort.hpp"
 #include "pipeline/track/track_report.hpp"
 
@@ -132,9 +132,8 @@ void print_frames(const Frames& frames, std::ostream& out) {
   out << formatted("; %llu missing between them, %zu damaged\n", static_cast<PrintedU64>(frames.missing),
                    frames.damaged.size());
   if (!frames.skews_ms.empty()) {
-    std::vector<double> sorted = frames.skews_ms;
-    std::sort(sorted.begin(), sorted.end());
-    out << formatted("  skew       median %.3f ms, largest %.3f ms\n", sorted[sorted.size() / 2], sorted.back());
+    const Percentiles skew_ms = percentiles(frames.skews_ms);
+    out << formatted("  skew       median %.3f ms, largest %.3f ms\n", skew_ms.p50, skew_ms.max);
   }
   if (frames.slowest_us > 0) {
     out << formatted("  slowest    pair %llu, %.2f ms in the pipeline, of which %s %.2f ms\n",

@@ -128,7 +128,7 @@ int run(int argc, char** argv) {
   CLI::App* replay_command = app.add_subcommand("replay", "runs a recording through the tracker");
   add_rig_options(*replay_command, replay.rig);
   replay_command->add_option("--out", replay.out, "folder for tracks.csv, summary.json, telemetry.bin");
-  replay_command->add_option("--truth", replay.truth, "FILE for the ground truth of synthetic:NAME, for eval");
+  replay_command->add_option("--truth", replay.rig.truth, "FILE for the ground truth of synthetic:NAME, for eval");
   replay_command->add_option("--render", replay.render, "FILE.mp4, or a folder for PNG pictures");
   replay_command->add_option("--pace", pace, "max: as fast as it goes; real: in real time, with telemetry over UDP")
       ->check(CLI::IsMember({"max", "real"}));
@@ -214,7 +214,6 @@ int run(int argc, char** argv) {
   choose_simd(simd);
   if (*replay_command) {
     replay.real_time = pace == "real";
-    replay.rig.truth = replay.truth.has_value();
     if (!replay_frames.empty()) replay.frames = stereotrack::parse_frames(replay_frames);
     if (!explain.empty()) replay.explain = stereotrack::parse_explain(explain);
     if (check_config) return stereotrack::check_replay(replay, std::cout);

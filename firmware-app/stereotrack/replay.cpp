@@ -167,7 +167,7 @@ class Replay {
       } else {
         process(pair);
       }
-      if (arguments_.truth) truth_.add(pair.ordinal, *rig_.scene);
+      if (arguments_.rig.truth) truth_.add(pair.ordinal, *rig_.scene);
       progress.step();
     }
     progress.finish();
@@ -189,7 +189,7 @@ class Replay {
       summary_.telemetry_dropped = udp_->counters().dropped;
       summary_.telemetry_failed = udp_->counters().failed;
     }
-    if (arguments_.truth) truth_.save(*arguments_.truth);
+    if (arguments_.rig.truth) truth_.save(*arguments_.rig.truth);
     if (!arguments_.out) return;
     const fs::path folder = *arguments_.out;
     try {

@@ -13,7 +13,6 @@ namespace stereotrack {
 struct ReplayArguments {
   RigArguments rig;
   std::optional<std::string> out;         ///< --out DIR
-  std::optional<std::string> truth;       ///< --truth FILE, of a synthetic scene; with rig.truth
   std::optional<std::string> render;      ///< --render FILE.mp4, or a folder for PNG pictures
   std::optional<ExplainRequest> explain;  ///< --explain ID|A:B
   bool real_time = false;                 ///< --pace real

@@ -80,7 +80,7 @@ Rig open_rig(const RigArguments& arguments) {
   const config::Configuration& configuration = rig.configuration();
 
   if (synthetic) {
-    open_scene(arguments.source, arguments.truth, rig);
+    open_scene(arguments.source, rig, arguments.truth.has_value());
   } else if (rig.recording == nullptr) {
     rig.source = capture::open_replay(arguments.source, {.fps = configuration.source.fps,
                                                          .flip = configuration.source.flip,

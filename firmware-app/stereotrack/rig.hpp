@@ -15,7 +15,7 @@ struct RigArguments {
   std::optional<std::string> calibration;  ///< --calibration; else the source's own folder is asked
   std::optional<std::string> config;  ///< --config; else the recording's, or stereotrack.toml in the source's folder
   std::vector<std::string> set;       ///< --set KEY=VALUE, in order
-  bool truth = false;                 ///< the ground truth of a synthetic scene is wanted
+  std::optional<std::string> truth;   ///< --truth FILE: of a synthetic scene, for its ground truth
 };
 
 /// Ordinals from `first` to `last`, both included.

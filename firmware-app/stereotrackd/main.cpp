@@ -108,7 +108,7 @@ std::unique_ptr<capture::LiveSource> open_source(Rig& rig, bool check, daemon::D
   const config::SourceConfig& source = rig.configuration().source;
   if (source.name == kCameras) return open_live_cameras(rig, check, parts);
   if (source.name.starts_with(kSynthetic)) {
-    open_scene(source.name, false, rig);
+    open_scene(source.name, rig);
   } else if (record::is_recording(source.name)) {
     open_recording(source.name, rig);
     if (!rig.recording->warning().empty()) log(LogLevel::kWarning, rig.recording->warning());

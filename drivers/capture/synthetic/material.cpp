@@ -91,14 +91,14 @@ Vec3 mottled(Vec3 colour, double amount) noexcept { return colour * (1.0 + amoun
 
 Vec3 paving(const Material& m, double u, double v) noexcept {
   const double size = m.scale;
-  const double row = std::floor(v / size);
-  const double shifted = u + (static_cast<std::int64_t>(row) & 1 ? 0.5 * size : 0.0);
+  const std::int64_t row = whole(v / size);
+  const double shifted = u + ((row & 1) != 0 ? 0.5 * size : 0.0);
   const std::int64_t column = whole(shifted / size);
-  const double tone = cell(column, static_cast<std::int64_t>(row), 1, m.seed);
+  const double tone = cell(column, row, 1, m.seed);
   const double stain = fractal_noise(u * 0.35, v * 0.35, 4, m.seed + 11);
   const double grain = fractal_noise(u * 9.0, v * 9.0, 3, m.seed + 12);
   Vec3 colour = mottled(m.a, 0.13 * tone + 0.30 * stain + 0.16 * grain);
-  if (cell_bits(column, static_cast<std::int64_t>(row), 2, m.seed) % 9 == 0) colour = mix(colour, m.c, 0.45);
+  if (cell_bits(column, row, 2, m.seed) % 9 == 0) colour = mix(colour, m.c, 0.45);
   const double joint = std::fmin(to_grid(shifted, size), to_grid(v, size));
   return mix(colour, mottled(m.b, 0.3 * grain), 1.0 - smoothstep(0.006, 0.016, joint));
 }
@@ -115,14 +115,14 @@ Vec3 asphalt(const Material& m, double u, double v) noexcept {
 Vec3 brick(const Material& m, double u, double v) noexcept {
   constexpr double kLength = 0.25;
   constexpr double kHeight = 0.083;
-  const double row = std::floor(v / kHeight);
-  const double shifted = u + (static_cast<std::int64_t>(row) & 1 ? 0.5 * kLength : 0.0);
+  const std::int64_t row = whole(v / kHeight);
+  const double shifted = u + ((row & 1) != 0 ? 0.5 * kLength : 0.0);
   const std::int64_t column = whole(shifted / kLength);
-  const double tone = cell(column, static_cast<std::int64_t>(row), 0, m.seed);
+  const double tone = cell(column, row, 0, m.seed);
   const double weather = fractal_noise(u * 0.5, v * 0.9, 4, m.seed + 7);
   const double grain = fractal_noise(u * 14.0, v * 14.0, 2, m.seed + 8);
   Vec3 colour = mottled(mix(m.a, m.b, 0.5 + 0.5 * tone), 0.28 * weather + 0.14 * grain);
-  if (cell_bits(column, static_cast<std::int64_t>(row), 5, m.seed) % 13 == 0) colour = colour * 0.55;
+  if (cell_bits(column, row, 5, m.seed) % 13 == 0) colour = colour * 0.55;
   const double joint = std::fmin(to_grid(shifted, kLength), to_grid(v, kHeight));
   return mix(colour, mottled(m.c, 0.25 * weather), 1.0 - smoothstep(0.004, 0.009, joint));
 }
@@ -222,9 +222,9 @@ Vec3 cardboard(const Material& m, const Shape& shape, Place p) noexcept {
 Vec3 planks(const Material& m, const Shape& shape, Place p) noexcept {
   const double width = p.face == 1 ? shape.half.z : shape.half.x;
   const double height = p.face == 2 ? shape.half.z : shape.half.y;
-  const double board = std::floor(p.v / m.scale);
+  const std::int64_t board = whole(p.v / m.scale);
   const double fibre = fractal_noise(p.u * 2.5, p.v * 40.0, 3, m.seed + static_cast<std::uint32_t>(p.face));
-  Vec3 colour = mottled(m.a, 0.16 * cell(static_cast<std::int64_t>(board), p.face, 0, m.seed) + 0.22 * fibre);
+  Vec3 colour = mottled(m.a, 0.16 * cell(board, p.face, 0, m.seed) + 0.22 * fibre);
   colour = colour * (1.0 - 0.65 * (1.0 - smoothstep(0.004, 0.012, to_grid(p.v, m.scale))));
   const double edge = std::fmin(width - std::abs(p.u), height - std::abs(p.v));
   if (edge < 0.08) return mottled(m.b, 0.2 * fibre) * (edge > 0.07 ? 0.5 : 1.0);

@@ -137,7 +137,7 @@ Scene draw(const Arguments& arguments) {
   set.insert(set.end(), arguments.set.begin(), arguments.set.end());
   Rig rig;
   rig.loaded = load_configuration(std::nullopt, set);
-  open_scene("synthetic:eleven", false, rig);
+  open_scene("synthetic:eleven", rig);
   check_rig(rig);
   return {rig.configuration(), *rig.calibration,
           std::make_unique<capture::Film>(*rig.source, capture::Film::Config{.most_bytes = std::uint64_t{4} << 30})};
